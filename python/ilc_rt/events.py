@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import MISSING, asdict, dataclass, fields
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_args
 
 from ilc_rt.figures import Figures
 from ilc_rt.lateness import (
@@ -122,6 +122,25 @@ class InputsEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class DriveState:
+    """State of the drive of an axis.
+
+    `state` is that of CiA 402 in words, e.g. ``"operation enabled"``, None before it is known.
+    """
+
+    axis: str
+    state: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DrivesEvent:
+    """A drive has changed its state; `drives` has all of the cell, in the order of the axes."""
+
+    name: ClassVar[str] = "drives"
+    drives: tuple[DriveState, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ProgressEvent:
     """Progress of the run."""
 
@@ -135,14 +154,15 @@ class ProgressEvent:
 class IterationEvent(Figures):
     """One run is over and in the library, with its figures.
 
-    `id` is the key of the run in the library, `index` counts the runs of the
-    campaign from 0, `digest` is the SHA-256 of its arrays.
+    `id` is the key of the run in the library, `index` counts the runs of the campaign from 0,
+    `digest` is the SHA-256 of its arrays. An older controller does not tell the `campaign`.
     """
 
     name: ClassVar[str] = "iteration"
     id: int
     index: int
     digest: str = ""
+    campaign: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +175,7 @@ class JudgedEvent:
     rolled_back: bool
     learning_off: bool
     remark: str | None = None
+    campaign: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,6 +301,7 @@ Event = (
     StartEvent
     | StateEvent
     | InputsEvent
+    | DrivesEvent
     | ProgressEvent
     | IterationEvent
     | JudgedEvent
@@ -291,23 +313,7 @@ Event = (
     | EndEvent
 )
 
-_CLASSES: dict[str, type[Any]] = {
-    cls.name: cls
-    for cls in (
-        StartEvent,
-        StateEvent,
-        InputsEvent,
-        ProgressEvent,
-        IterationEvent,
-        JudgedEvent,
-        DriftEvent,
-        LateEvent,
-        LatencyEvent,
-        RecordingEvent,
-        FaultEvent,
-        EndEvent,
-    )
-}
+_CLASSES: dict[str, type[Any]] = {cls.name: cls for cls in get_args(Event)}
 
 
 def parse_event(line: str | bytes) -> Event | None:
@@ -386,6 +392,10 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
             values["inputs"] = tuple(
                 InputState(str(one["name"]), str(one["use"]), one.get("on"))
                 for one in values["inputs"]
+            )
+        elif cls is DrivesEvent:
+            values["drives"] = tuple(
+                DriveState(str(one["axis"]), one.get("state")) for one in values["drives"]
             )
         elif cls is FaultEvent:
             values["cycles"] = _last_cycles(values.get("cycles"))

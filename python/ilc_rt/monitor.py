@@ -41,7 +41,7 @@ PAYLOAD_MAX_BYTES = 1 << 20
 # Topic under which an event of the history was published.
 PAST_TOPICS = {
     "start": "state", "iteration": "iteration", "judged": "iteration", "drift": "iteration",
-    "fault": "fault",
+    "fault": "fault", "inputs": "inputs", "drives": "drives",
 }  # fmt: skip
 TEXT_MAX = 2_000
 
@@ -159,7 +159,10 @@ class Monitor(Closing):
                 yield from self.ask_state(message.cell)
 
     def ask_history(self, cell: str | None = None) -> list[Message]:
-        """Query the start of the campaign that is running, its runs and faults, oldest first."""
+        """Query the start of the campaign that is running, its runs and faults, oldest first.
+
+        Digital inputs and the states of the drives, as they are now, come last.
+        """
         from zenoh import ConsolidationMode
 
         replies = self._session.get(
@@ -167,12 +170,14 @@ class Monitor(Closing):
             timeout=2.0,
             consolidation=ConsolidationMode.NONE,
         )
-        found: list[tuple[int, Message]] = []
+        found: list[tuple[float, Message]] = []
         for reply in replies:
             message = None if reply.ok is None else _message(reply.ok)
             if reply.ok is not None and message is not None:
                 number = str(reply.ok.key_expr).rpartition("/")[2]
-                place = int(number) if number.isdecimal() else -1
+                # First the start, last what is of now.
+                last = -1.0 if number == "start" else math.inf
+                place = int(number) if number.isdecimal() else last
                 found.append((place, replace(message, is_past=True)))
         return [message for _, message in sorted(found, key=lambda pair: pair[0])]
 

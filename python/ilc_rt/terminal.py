@@ -15,6 +15,7 @@ from rich.text import Text
 from ilc_rt.quantity import signed, unit_for
 from ilc_rt.table import NARROW, runs_table
 from ilc_rt.text import printable
+from ilc_rt.watched_axis import drive_words
 from ilc_rt.wording import describe, state_words
 
 if TYPE_CHECKING:
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
 
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 
-    from ilc_rt.watched import Note, WatchedCell
+    from ilc_rt.watched import WatchedCell
     from ilc_rt.watched_axis import WatchedAxis
+    from ilc_rt.watched_note import Note
 
 BAR_MAX = 50
 SPARK_MAX = 40
@@ -245,6 +247,8 @@ class CellView:
             parts.append(f"woke late by {late.p99:.3g} µs (99 %), {late.max:.3g} µs at most")
         if parts:
             yield Text(f"loop      {', '.join(parts)}")
+        if any(axis.drive for axis in cell.axes):
+            yield Text(f"drives    {drive_words(cell.axes)}")
         if cell.inputs:
             told = (f"{printable(one.name)} {INPUT_WORDS[one.on]}" for one in cell.inputs)
             yield Text(f"inputs    {', '.join(told)}")

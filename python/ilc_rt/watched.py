@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt.comparison import Comparison, remark_on
 from ilc_rt.events import (
     DriftEvent,
+    DrivesEvent,
     EndEvent,
     FaultEvent,
     InputsEvent,
@@ -32,6 +33,7 @@ from ilc_rt.record import IterationRecord
 from ilc_rt.result import UNTIL_STOPPED
 from ilc_rt.text import printable
 from ilc_rt.watched_axis import WatchedAxis
+from ilc_rt.watched_note import Note
 from ilc_rt.wording import drift
 
 if TYPE_CHECKING:
@@ -50,28 +52,6 @@ AXES_MAX = 64
 NAME_MAX = 40
 #: Elapsed time from which the time left can be told.
 TOLD_AFTER_S = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Note:
-    """A line on something that happened.
-
-    Attributes
-    ----------
-    kind : str
-        "fault", "warning", "note", or "log" for what is usual and only belongs in a log.
-    text : str
-        The line, printable.
-    at_s : float
-        When, by the clock of the cell.
-    campaign : int
-        Number of the campaign among those that were watched.
-    """
-
-    kind: str
-    text: str
-    at_s: float = 0.0
-    campaign: int = 0
 
 
 class WatchedCell:
@@ -149,6 +129,7 @@ class WatchedCell:
         """Forget what is of one campaign only; another one has begun, or may have."""
         self.start: StartEvent | None = None
         self.campaign: str | None = None
+        self._is_remembered = False
         self.iterations: int | None = None
         self.progress: float | None = None
         self.records: list[IterationRecord] = []
@@ -186,6 +167,7 @@ class WatchedCell:
             self.iteration, self.n_samples = event.iteration, event.n_samples
             self.progress = min(1.0, max(0.0, event.sample / max(1, event.n_samples)))
         elif isinstance(event, IterationEvent):
+            self._belong_to(event.campaign)
             self._keep(IterationRecord.from_event(event, ""))
         elif isinstance(event, JudgedEvent):
             self._judge(event)
@@ -196,6 +178,14 @@ class WatchedCell:
         if self._seen is None and self.state == "running" and self.done is not None:
             self._seen = self.done, self._clock()
 
+    def _belong_to(self, campaign: str | None) -> None:
+        """Take in which campaign a run is of; one whose start was missed is another one, too."""
+        if campaign is None or campaign == self.campaign:
+            return
+        if self.campaign is not None:
+            self._leave_campaign()
+        self.campaign = campaign
+
     def _see_rare(self, event: Event) -> None:
         if isinstance(event, FaultEvent):
             self.fault, self.late = event, event.late or self.late
@@ -205,6 +195,10 @@ class WatchedCell:
                 axis.is_faulty |= axis.name == event.axis
         elif isinstance(event, InputsEvent):
             self.inputs = event.inputs
+        elif isinstance(event, DrivesEvent):
+            states = {one.axis: one.state for one in event.drives}
+            for axis in self.axes:
+                axis.drive = states.get(axis.name)
         elif isinstance(event, DriftEvent):
             self.note("warning", drift(event))
         elif isinstance(event, LateEvent):
@@ -269,14 +263,22 @@ class WatchedCell:
             if self.iteration is not None and self.iteration < int(newest["index"]):
                 return
             self.campaign = str(newest["campaign"])
+            self._is_remembered = True
         self.recall(IterationRecord.from_row(row, library) for row in rows)
 
     def lacks(self, message: Message) -> bool:
         """Return whether a library may have what was not heard before this message."""
         if message.topic == "alive" or isinstance(message.event, StartEvent):
             return True
-        is_unknown = self.start is None and self.campaign is None
+        is_unknown = self.start is None and not self._is_remembered
         return isinstance(message.event, IterationEvent) and is_unknown
+
+    def named_by(self, event: Event | None) -> tuple[str | None, str | None]:
+        """Return the campaign, if it is known, and the digest of the run of an event."""
+        sure = self.campaign if self.start is not None else None
+        if isinstance(event, IterationEvent):
+            return event.campaign or sure, event.digest
+        return sure, None
 
     def recall(self, records: Iterable[IterationRecord]) -> None:
         """Take over the earlier runs of a campaign that goes on; those that were heard stay."""

@@ -4,9 +4,25 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ilc_rt.text import printable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 #: Batches of servo cycles whose largest error is kept.
 TRAIL_MAX = 120
+
+
+def drive_words(axes: Iterable[WatchedAxis]) -> str:
+    """Return the states of the drives: one for all, or each with its axes."""
+    states: dict[str, list[str]] = {}
+    for axis in axes:
+        states.setdefault(printable(axis.drive or "unknown"), []).append(printable(axis.name))
+    if len(states) == 1:
+        return next(iter(states))
+    return ", ".join(f"{state} ({', '.join(names)})" for state, names in states.items())
 
 
 @dataclass(slots=True)
@@ -24,6 +40,8 @@ class WatchedAxis:
         Largest absolute tracking error of each batch within a run, oldest first.
     is_faulty : bool
         True if a fault has named this axis.
+    drive : str or None
+        State of CiA 402 of its drive, in words.
     """
 
     name: str
@@ -34,3 +52,4 @@ class WatchedAxis:
     error_m: float | None = None
     trail_m: deque[float] = field(default_factory=lambda: deque(maxlen=TRAIL_MAX))
     is_faulty: bool = False
+    drive: str | None = None

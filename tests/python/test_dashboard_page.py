@@ -124,7 +124,7 @@ def test_numbers_change_while_the_cell_runs_and_it_comes_back(watched: Watched) 
     page = watched.page("/cell/gantry")
     wait(page, "state", "not heard yet")
     drives = watched.bench.drives(watched.cell)
-    # It ends when it is told: a slow browser finds it running, too.
+    # It ends when the test stops it: a slow browser finds it running, too.
     controller = watched.run(1000)
     wait(page, "state", "▶ running")
     wait(page, "run", "run ")

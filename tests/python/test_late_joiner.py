@@ -12,11 +12,13 @@ from ilc_rt import Cell, Library
 from ilc_rt.dashboard import charts
 from ilc_rt.dashboard.archive import Archive
 from ilc_rt.dashboard.model import CellModel
+from ilc_rt.watched_axis import drive_words
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from ilc_rt import CampaignResult
+    from ilc_rt.monitor import Message
 
 
 def test_another_campaign_whose_start_was_missed_begins_its_runs_anew() -> None:
@@ -24,6 +26,15 @@ def test_another_campaign_whose_start_was_missed_begins_its_runs_anew() -> None:
     fed(ended(1, 2e-3, digest="another"), model=model)
     assert [run.index for run in model.records] == [1]
     assert model.campaign is None
+
+
+def test_a_run_tells_its_campaign() -> None:
+    model = fed(ended(3, 1e-3, campaign="a"), ended(4, 1e-4, campaign="a"))
+    assert (model.campaign, [run.index for run in model.records]) == ("a", [3, 4])
+    assert model.named_by(ended(5, 1e-5, campaign="a", digest="d").event) == ("a", "d")
+    # As late in its campaign as that of the other one, whose end was missed.
+    fed(ended(5, 2e-3, campaign="b"), model=model)
+    assert (model.campaign, [run.index for run in model.records]) == ("b", [5])
 
 
 def test_a_state_after_the_end_belongs_to_the_next_campaign() -> None:
@@ -114,6 +125,21 @@ def test_a_late_joiner_takes_its_history_from_the_library(finished: CampaignResu
     assert factor > 1
     assert option["series"][0]["name"] == "programmed"
     assert archive.capture("nobody", None) is None
+
+
+def test_the_newest_state_of_each_drive_is_shown() -> None:
+    def drives(*states: str | None) -> Message:
+        names = ("x", "y")
+        told = [{"axis": a, "state": s} for a, s in zip(names, states, strict=True)]
+        return said({"event": "drives", "drives": told}, topic="drives")
+
+    model = fed(said(START), drives("switched on", None))
+    assert [axis.drive for axis in model.axes] == ["switched on", None]
+    assert drive_words(model.axes) == "switched on (x), unknown (y)"
+    fed(drives("operation enabled", "operation enabled"), model=model)
+    assert drive_words(model.axes) == "operation enabled"
+    fed(drives("switch on disabled", "fault"), model=model)
+    assert drive_words(model.axes) == "switch on disabled (x), fault (y)"
 
 
 def test_a_description_names_the_axes_until_the_controller_does(gantry: Path) -> None:

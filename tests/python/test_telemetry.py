@@ -146,11 +146,12 @@ def test_the_same_events_are_heard_as_are_printed(watched: Watched) -> None:
     """Under their keys, in order, complete and without extras."""
     assert watched.status == 0, watched.controller.errors
     assert watched.controller.errors == []
-    assert set(watched.heard) == {"state", "iteration", "latency", "servo"}
+    assert set(watched.heard) == {"state", "iteration", "latency", "drives", "servo"}
     for key, kinds in {
         "state": {"start", "state", "progress", "end"},
         "iteration": {"iteration"},
         "latency": {"late", "latency"},
+        "drives": {"drives"},
     }.items():
         printed = [event for event in watched.controller.events if event["event"] in kinds]
         assert watched.heard[key] == printed
@@ -204,8 +205,10 @@ def test_a_late_joiner_gets_the_state(watched: Watched) -> None:
 
 
 def test_a_late_joiner_gets_the_campaign_so_far(watched: Watched) -> None:
-    """The start first, then the runs, if one has ended by then."""
-    start, *runs = watched.history_asked
+    """The start first, then the runs, if one has ended by then; last what the drives do now."""
+    start, *runs, drives = watched.history_asked
+    assert {one["state"] for one in drives["drives"]} == {"operation enabled"}
+    assert drives in watched.heard["drives"]
     printed = watched.controller.events
     assert start == next(event for event in printed if event["event"] == "start")
     assert runs == [event for event in printed if event["event"] == "iteration"][: len(runs)]

@@ -58,7 +58,7 @@ def serve(path: str) -> int:
                 continue
             pid, ended, client = key.data
             if key.fileobj is client:
-                # Its end, as nothing else is sent: whoever asked has gone.
+                # Its end, as nothing else is sent: the program that asked has gone.
                 os.kill(pid, signal.SIGKILL)
             _, status = os.waitpid(pid, 0)
             ready.unregister(ended)

@@ -154,9 +154,8 @@ class _Screen:
         self.faults += not message.is_past and isinstance(message.event, FaultEvent)
         cell.take(message)
         if is_new or cell.lacks(message):
-            digest = getattr(message.event, "digest", None)
-            campaign = cell.campaign if cell.start is not None else None
-            cell.remember(self._memory.campaign(cell.name, campaign, digest), "")
+            rows = self._memory.campaign(cell.name, *cell.named_by(message.event))
+            cell.remember(rows, "")
 
 
 class _View:

@@ -10,6 +10,7 @@ from ilc_rt.dashboard.frame import chart, draw, level, say, tag, text
 from ilc_rt.dashboard.status import SYMBOLS, axis_words
 from ilc_rt.lateness import late_sentence
 from ilc_rt.quantity import digits, unit_for
+from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from nicegui import Client, ui
@@ -17,9 +18,11 @@ if TYPE_CHECKING:
     from ilc_rt.dashboard.model import CellModel
 
 COLUMNS = (
-    "axis", "state", "set point", "position", "error", "learned input", "max error of the run",
-    "RMS error of the run",
+    "axis", "state", "drive", "set point", "position", "error", "learned input",
+    "max error of the run", "RMS error of the run",
 )  # fmt: skip
+#: Columns of words; the others have numbers.
+WORDS = {"state", "drive"}
 SIGNS = {"info": "·", "warn": SYMBOLS["warn"], "fault": SYMBOLS["fault"]}
 #: Levels of the kinds of notes.
 LEVELS = {"fault": "fault", "warning": "warn", "note": "info", "log": "info"}
@@ -33,7 +36,7 @@ class AxisTable:
         with tag("div", "scroll"), tag("table", "plain-table"):
             with tag("thead"), tag("tr"):
                 for column in COLUMNS:
-                    with tag("th", "text" if column == "state" else "", scope="col"):
+                    with tag("th", "text" if column in WORDS else "", scope="col"):
                         text(column)
             self._body = tag("tbody")
         self._names: tuple[str, ...] = ()
@@ -50,11 +53,12 @@ class AxisTable:
             level(row[1], status.level)
             base = cell.units[axis]
             now = cell.axes[axis]
-            for column, value in ((2, now.reference_m), (3, now.measured_m)):
+            say(row[2], printable(now.drive or "-"))
+            for column, value in ((3, now.reference_m), (4, now.measured_m)):
                 say(row[column], _steady(value, base))
-            say(row[4], _small(now.error_m, base))
-            say(row[5], _small(now.input, cell.input_units[axis]))
-            for column, name in ((6, "axes_tracking_inf_m"), (7, "axes_tracking_rms_m")):
+            say(row[5], _small(now.error_m, base))
+            say(row[6], _small(now.input, cell.input_units[axis]))
+            for column, name in ((7, "axes_tracking_inf_m"), (8, "axes_tracking_rms_m")):
                 figures = getattr(last, name, ())
                 value = figures[axis] if axis < len(figures) else None
                 say(row[column], unit_for(base, value).text(value))
@@ -68,7 +72,7 @@ class AxisTable:
                 with tag("tr", data_axis=name):
                     labels = []
                     for column in COLUMNS:
-                        with tag("td", "text" if column == "state" else ""):
+                        with tag("td", "text" if column in WORDS else ""):
                             classes = "level-mark" if column == "state" else ""
                             labels.append(text("-", classes, column.replace(" ", "-")))
                     labels[0].set_text(name)

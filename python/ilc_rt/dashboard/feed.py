@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from ilc_rt.dashboard.archive import Archive
     from ilc_rt.dashboard.fleet import Fleet
+    from ilc_rt.events import Event
 
 TURN_S = 0.5
 
@@ -72,18 +73,18 @@ class Feed:
                 self._fleet.apply(message, time.monotonic(), time.time())
                 cell = self._fleet.cells.get(message.cell)
                 if cell is not None and (not known or cell.lacks(message)):
-                    self._recall(message.cell, getattr(message.event, "digest", None))
+                    self._recall(message.cell, message.event)
             self._fleet.lost = self._monitor.lost
 
-    def _recall(self, name: str, digest: str | None = None) -> None:
+    def _recall(self, name: str, event: Event | None = None) -> None:
         """Give a cell the earlier runs of its campaign, as far as libraries have them.
 
-        A campaign whose start was not heard is known by the digest of one of its runs.
+        A campaign whose start was not heard is known by the event of one of its runs.
         """
         cell = self._fleet.cells.get(name)
         if cell is None:
             return
-        campaign = cell.campaign if cell.start is not None else None
+        campaign, digest = cell.named_by(event)
         try:
             rows = self._archive.campaign(name, campaign, digest)
         except (BadInputError, OSError):

@@ -15,8 +15,8 @@ use ilc_rt::fieldbus::transport::{InProcess, Responder, TapCount, TappedBus};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::rt::{Clock, MonotonicClock, Stamps};
 use ilc_rt::servo::{
-    Cycle, InputBits, Mailbox, Message, Orders, PhaseName, Sample, StopReason, Tap as LoopTap,
-    TickStatus, mailbox,
+    Cycle, DriveStates, InputBits, Mailbox, Message, Orders, PhaseName, Sample, StopReason,
+    Tap as LoopTap, TickStatus, mailbox,
 };
 use ilc_sim::Machine;
 use rtrb::RingBuffer;
@@ -216,6 +216,8 @@ pub struct Rig {
     pub recorded: Vec<Stamps>,
     /// Digital inputs as told last.
     pub inputs: InputBits,
+    /// States of the drives as told, oldest first.
+    pub told_states: Vec<DriveStates>,
     /// Reason of the stop, if the axes were stopped.
     pub reason: Option<StopReason>,
     /// SYNCs sent before the tick in which the stop began.
@@ -329,6 +331,7 @@ impl Rig {
             before: Vec::with_capacity(64),
             recorded: Vec::with_capacity(1024),
             inputs: InputBits::default(),
+            told_states: Vec::new(),
             reason: None,
             stopping_at: None,
             ended: Vec::new(),
@@ -371,6 +374,7 @@ impl Rig {
                 Message::RunStarted { run, table } => self.started.push((run, table)),
                 Message::RunEnded { run, overruns, .. } => self.ended.push((run, overruns)),
                 Message::Inputs(bits) => self.inputs = bits,
+                Message::Drives(states) => self.told_states.push(states),
                 Message::Before(sample) => self.before.push(sample),
                 Message::Cycle(stamps) => self.recorded.push(stamps),
                 Message::Stopping(reason) => {

@@ -66,6 +66,7 @@ impl<'a> Announcer<'a> {
             Event::Fault { .. } => "fault",
             Event::Latency { .. } | Event::Late { .. } => "latency",
             Event::Inputs { .. } => "inputs",
+            Event::Drives { .. } => "drives",
             Event::Start { .. }
             | Event::State { .. }
             | Event::Progress { .. }
@@ -79,9 +80,9 @@ impl<'a> Announcer<'a> {
             | Event::Judged { .. }
             | Event::Drift { .. }
             | Event::Fault { .. } => Kept::Past,
+            Event::Inputs { .. } | Event::Drives { .. } => Kept::Latest,
             Event::Progress { .. }
             | Event::Recording { .. }
-            | Event::Inputs { .. }
             | Event::Latency { .. }
             | Event::Late { .. } => Kept::No,
         };

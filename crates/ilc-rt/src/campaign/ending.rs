@@ -57,6 +57,7 @@ impl Running<'_> {
     /// Publishes a stored run; returns its place.
     fn publish_stored(&mut self, id: i64, record: &IterationRecord) -> usize {
         self.announcer.publish(&Event::Iteration {
+            campaign: self.campaign.clone(),
             id,
             index: record.index,
             digest: record.digest(),

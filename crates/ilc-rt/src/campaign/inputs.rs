@@ -2,9 +2,10 @@
 
 use super::error::CampaignError;
 use super::options::{Options, StartOn};
-use crate::config::{Cell, Direction, Input, InputUse};
-use crate::record::InputState;
-use crate::servo::InputBits;
+use crate::config::{Axis, Cell, Direction, Input, InputUse};
+use crate::fieldbus::cia402::State;
+use crate::record::{DriveState, InputState};
+use crate::servo::{DriveStates, InputBits};
 
 /// Digital inputs of every drive of a cell that has named ones, as read at standstill; `None` for a drive without.
 pub(super) type Words = Vec<Option<u32>>;
@@ -79,6 +80,15 @@ pub(super) fn place(cell: &Cell, input: &Input) -> String {
 /// Returns the sentence for an open guard.
 pub(super) fn open(cell: &Cell, input: &Input) -> String {
     format!("guard {} is open: close it, then start again", place(cell, input))
+}
+
+/// Returns the states of the drives as published.
+pub(super) fn drives(cell: &Cell, states: &DriveStates) -> Vec<DriveState> {
+    let of = |(axis, state): (&Axis, &Option<State>)| DriveState {
+        axis: axis.name.clone(),
+        state: state.map(|state| state.to_string()),
+    };
+    cell.axes.iter().zip(states).map(of).collect()
 }
 
 /// Returns the inputs as published.

@@ -181,6 +181,10 @@ impl Running<'_> {
                     let inputs = inputs::states(self.cell, bits);
                     self.announcer.publish(&Event::Inputs { inputs });
                 }
+                Message::Drives(states) => {
+                    let drives = inputs::drives(self.cell, &states);
+                    self.announcer.publish(&Event::Drives { drives });
+                }
                 Message::Before(sample) => self.before.push(sample),
                 Message::Cycle(stamps) => {
                     if let Some(event) = self.late.take(stamps, self.phase_iteration) {
@@ -236,6 +240,7 @@ impl Running<'_> {
             return;
         }
         let event = Event::Judged {
+            campaign: self.campaign.clone(),
             id,
             index: *index,
             rolled_back: figures.rolled_back,

@@ -3,7 +3,7 @@
 //! It has its own thread and session; the campaign passes formatted text through a bounded queue
 //! and drops what does not fit. It can neither delay nor command the loop.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -40,6 +40,8 @@ pub(super) enum Kept {
     Start,
     /// The state, until the next one.
     State,
+    /// The newest one of its key.
+    Latest,
     /// A run, a decision or a fault.
     Past,
 }
@@ -59,10 +61,12 @@ struct History {
     /// Events before the oldest one in `past`.
     n_left_out: usize,
     state: Option<String>,
+    /// Newest messages of their keys.
+    latest: BTreeMap<&'static str, String>,
 }
 
 impl History {
-    fn keep(&mut self, json: &str, kept: Kept) {
+    fn keep(&mut self, key: &'static str, json: &str, kept: Kept) {
         match kept {
             Kept::No => {}
             Kept::Start => {
@@ -70,6 +74,9 @@ impl History {
                 self.state.clone_from(&self.start);
             }
             Kept::State => self.state = Some(json.to_owned()),
+            Kept::Latest => {
+                self.latest.insert(key, json.to_owned());
+            }
             Kept::Past => {
                 if self.past.len() == HISTORY_MAX {
                     self.past.pop_front();
@@ -86,7 +93,8 @@ impl History {
         let past = self.past.iter().enumerate();
         let past =
             past.map(|(number, json)| ((self.n_left_out + number).to_string(), json.clone()));
-        start.chain(past).collect()
+        let latest = self.latest.iter().map(|(key, json)| ((*key).to_owned(), json.clone()));
+        start.chain(past).chain(latest).collect()
     }
 }
 
@@ -182,7 +190,7 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
     let past = session.declare_queryable(format!("{past_key}/*")).callback(past).wait()?;
     for Message { key, json, kept } in messages {
         if let Ok(mut history) = history.lock() {
-            history.keep(&json, kept);
+            history.keep(key, &json, kept);
         }
         session
             .put(format!("{prefix}/{key}"), json)
@@ -229,15 +237,17 @@ mod tests {
     #[test]
     fn a_late_joiner_gets_the_start_and_what_came_after_it() {
         let mut history = History::default();
-        history.keep("bringing up", Kept::State);
-        history.keep("start", Kept::Start);
-        history.keep("progress", Kept::No);
-        history.keep("run 0", Kept::Past);
-        assert_eq!(ends(&history), ["start start", "0 run 0"]);
+        history.keep("state", "bringing up", Kept::State);
+        history.keep("state", "start", Kept::Start);
+        history.keep("drives", "switched on", Kept::Latest);
+        history.keep("state", "progress", Kept::No);
+        history.keep("iteration", "run 0", Kept::Past);
+        history.keep("drives", "enabled", Kept::Latest);
+        assert_eq!(ends(&history), ["start start", "0 run 0", "drives enabled"]);
         assert_eq!(history.state.as_deref(), Some("start"));
-        history.keep("running", Kept::State);
+        history.keep("state", "running", Kept::State);
         assert_eq!(history.state.as_deref(), Some("running"));
-        history.keep("another start", Kept::Start);
+        history.keep("state", "another start", Kept::Start);
         assert_eq!(ends(&history), ["start another start"]);
     }
 
@@ -245,7 +255,7 @@ mod tests {
     fn the_history_is_bounded_and_keeps_its_numbers() {
         let mut history = History::default();
         for number in 0..HISTORY_MAX + 2 {
-            history.keep(&number.to_string(), Kept::Past);
+            history.keep("iteration", &number.to_string(), Kept::Past);
         }
         let ends = ends(&history);
         assert_eq!((ends.len(), ends[0].as_str()), (HISTORY_MAX, "2 2"));

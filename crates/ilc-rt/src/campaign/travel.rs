@@ -281,7 +281,8 @@ impl Journey {
                 | Message::RunEnded { .. }
                 | Message::Before(_)
                 | Message::Cycle(_)
-                | Message::Inputs(_) => {}
+                | Message::Inputs(_)
+                | Message::Drives(_) => {}
             }
         }
     }

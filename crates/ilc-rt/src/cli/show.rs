@@ -121,6 +121,7 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
         Event::Judged { index, remark, .. } => runs.judged(*index, remark.as_deref()),
         Event::State { .. }
         | Event::Inputs { .. }
+        | Event::Drives { .. }
         | Event::Recording { .. }
         | Event::Progress { .. }
         | Event::Late { .. } => None,

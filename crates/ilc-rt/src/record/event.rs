@@ -66,6 +66,11 @@ pub enum Event {
         /// All inputs of the cell, in their order.
         inputs: Vec<InputState>,
     },
+    /// A drive has changed its state.
+    Drives {
+        /// All axes of the cell, in their order.
+        drives: Vec<DriveState>,
+    },
     /// Progress of the current run; about ten per second.
     Progress {
         /// Number of the run.
@@ -77,6 +82,8 @@ pub enum Event {
     },
     /// A run ended and is stored.
     Iteration {
+        /// Campaign it belongs to.
+        campaign: String,
         /// Row in the library.
         id: i64,
         /// Number of the run.
@@ -89,6 +96,8 @@ pub enum Event {
     },
     /// The law decided on a run that was already published, as it was still computing.
     Judged {
+        /// Campaign it belongs to.
+        campaign: String,
         /// Row in the library.
         id: i64,
         /// Number of the run.
@@ -183,6 +192,15 @@ pub enum Event {
         /// Runs kept in the whole campaign.
         iterations: u32,
     },
+}
+
+/// State of a drive.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct DriveState {
+    /// Name of the axis.
+    pub axis: String,
+    /// State of CiA 402 in words, as `operation enabled`; absent before it is known.
+    pub state: Option<String>,
 }
 
 /// A digital input of a cell.

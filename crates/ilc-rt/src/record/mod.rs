@@ -14,7 +14,7 @@ mod late;
 mod text;
 
 pub use axes::AxisKinds;
-pub use event::{EndStatus, Event, InputState, SCHEMA, StateName};
+pub use event::{DriveState, EndStatus, Event, InputState, SCHEMA, StateName};
 pub use fault::{Fault, FaultKind, LastCycles};
 pub use fields::{Field, FieldKind, figure_fields};
 pub use figures::{Figures, distances_m, infinity_norm, rms};

@@ -14,6 +14,7 @@ use super::pending::PendingCycles;
 use super::phase::{Phase, PhaseName};
 use super::spec::{AxisSpec, ServoSpec};
 use super::stall::{HOLD_AFTER, Stall};
+use super::states::DriveStates;
 use super::tap::Tap;
 use crate::fieldbus::AxisNetwork;
 use crate::fieldbus::canopen::emcy;
@@ -88,6 +89,8 @@ pub struct Cycle {
     pub(super) inputs: [inputs::Input; INPUTS_MAX],
     /// As told last.
     pub(super) input_bits: InputBits,
+    /// States of the drives as told.
+    pub(super) drive_states: DriveStates,
     /// Nodes, by their numbers, that have told that they are operational.
     pub(super) operational: u128,
     /// True in the tick of a press of a start button.
@@ -171,6 +174,7 @@ impl Cycle {
             inputs: Default::default(),
             operational: 0,
             input_bits: InputBits::default(),
+            drive_states: DriveStates::default(),
             is_pressed: false,
             phase: Phase::Enabling { ticks: 0 },
             reference: Setpoint {
@@ -278,6 +282,7 @@ impl Cycle {
         }
         self.give_out();
         self.read_inputs();
+        self.tell_states();
         let fault = received.err().or_else(|| self.find_fault());
         let before = self.phase_name();
         if let Some(reason) = fault {

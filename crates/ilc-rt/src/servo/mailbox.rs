@@ -10,6 +10,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::inputs::InputBits;
 use super::orders::{Orders, OrdersSeen};
 use super::phase::PhaseName;
+use super::states::DriveStates;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::NmtState;
 use crate::fieldbus::network::Stranger;
@@ -231,6 +232,8 @@ pub enum Message {
     Before(Sample),
     /// Digital inputs have changed.
     Inputs(InputBits),
+    /// A drive has changed its state.
+    Drives(DriveStates),
     /// Stages of a cycle: of one that was late or in which a stop began, and of those before it, oldest first.
     Cycle(Stamps),
     /// The axes are being stopped.

@@ -68,7 +68,7 @@ fn does_not_hear_itself((mut a, mut b): Ends) {
 }
 
 fn returns_at_once_without_a_timeout((mut a, _b): Ends) {
-    // The quickest: this computer may stall, but whoever waits does so each time.
+    // The quickest: this computer may stall, but a bus that waits does so each time.
     let look = |_| {
         let start = Instant::now();
         assert_eq!(a.recv(Duration::ZERO).unwrap(), None);
