@@ -148,19 +148,33 @@ def with_drives(text: str, folder: Path) -> None:
         drives.close()
 
 
-def after_a_run(text: str, folder: Path) -> None:
-    """Run a line about the last run in real time, or about its recording, after such a run."""
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run in real time: library, late cycles and recording."""
+    folder = tmp_path_factory.mktemp("made")
     address = free_bus()
     cell = ROOT / NETWORK_CELL
-    library = next((word for word in text.split() if word.endswith(".db")), "ilc-library.db")
     drives = Process([program("ilc-sim"), "run", cell, "--bus", address], folder)
+    argv = [
+        program("ilc-rt"), "run", cell, "--bus", address, "--library", folder / "made.db",
+        "--iterations", "1", "--simulated-drives", "--no-telemetry", "--record",
+        folder / "gantry.mcap",
+    ]  # fmt: skip
     try:
         drives.line_with("ready")
-        made = "--iterations 1 --simulated-drives --no-telemetry"
-        made += " --record gantry.mcap" if "gantry.mcap" in text else ""
-        run(f"ilc-rt run {cell} --bus {address} --library {library} {made}", folder)
+        controller = Process(argv, folder)
+        assert controller.end() == 0, controller.errors
     finally:
         drives.close()
+    return folder
+
+
+def after_a_run(text: str, folder: Path, made: Path) -> None:
+    """Run a line about the last run in real time, or about its recording, after such a run."""
+    library = next((word for word in text.split() if word.endswith(".db")), "ilc-library.db")
+    for path in [*made.glob("made.*"), made / "gantry.mcap"]:
+        name = path.name.replace("made", Path(library).stem)
+        (folder / name).write_bytes(path.read_bytes())
     assert re.search("cycles|frames", run(text, folder))
 
 
@@ -297,7 +311,7 @@ def test_a_line_that_one_is_told_to_type_works(
     elif text.startswith("ilc-sim run"):
         drives_alone(text, folder)
     elif re.match(r"ilc-rt (why|replay|record) ", text):
-        after_a_run(text, folder)
+        after_a_run(text, folder, request.getfixturevalue("made"))
     elif re.match(r"ilc-rt (run|identify)", text):
         with_drives(text, folder)
     elif re.match(r"(yes \| )?ilc-rt (scan|sdo|status|reset|enable|home|jog|goto|disable) ", text):

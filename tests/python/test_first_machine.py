@@ -163,6 +163,9 @@ def test_the_page_leads_to_a_learned_contour(reader: Reader) -> None:
                     )  # fmt: skip
                     assert refused.returncode == 2
                     assert "axis x (node 1) is not homed" in refused.stderr
+                if line == "ilc-rt ctl machine.toml start":
+                    # A person is not as fast as the machine is ready.
+                    reader.until_state(": waiting, run 0")
                 if line == "ilc-rt ctl machine.toml stop":
                     # The part is made.
                     reader.until_state(": waiting, run 1")

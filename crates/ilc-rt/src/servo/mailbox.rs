@@ -10,12 +10,15 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::inputs::InputBits;
 use super::orders::{Orders, OrdersSeen};
 use super::phase::PhaseName;
-use super::states::DriveStates;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::NmtState;
+use crate::fieldbus::cia402::State;
 use crate::fieldbus::network::Stranger;
 use crate::interpolate::MAX_AXES;
 use crate::rt::Stamps;
+
+/// State of each drive by its last statusword; `None` before the first one, and beyond the axes of the cell.
+pub type DriveStates = [Option<State>; MAX_AXES];
 
 /// One servo cycle: commands and measurements of the same SYNC.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -4,11 +4,6 @@
 
 use super::cycle::Cycle;
 use super::mailbox::Message;
-use crate::fieldbus::cia402::State;
-use crate::interpolate::MAX_AXES;
-
-/// State of each drive by its last statusword; `None` before the first one, and beyond the axes of the cell.
-pub type DriveStates = [Option<State>; MAX_AXES];
 
 impl Cycle {
     /// Tells the states, if one has changed since the last tick.
