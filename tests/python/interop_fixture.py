@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 CELL = ROOT / "examples" / "01_gantry.toml"
 SYNC_S = 0.01
-PATIENCE_S = 5.0
+PATIENCE_S = 30.0
 COUNTS_PER_M = 100_000_000
 START_COUNTS = 4_000_000
 STEP_COUNTS = 50_000
@@ -52,6 +52,11 @@ def wait_until(holds: Callable[[], bool], what: str, timeout_s: float = PATIENCE
     while not holds():
         assert time.monotonic() < deadline, f"not within {timeout_s} s: {what}"
         time.sleep(0.002)
+
+
+def wait_for_emergency(node: canopen.RemoteNode, code: int) -> None:
+    """Wait for an emergency message; `emcy.wait` misses one that comes before it begins to wait."""
+    wait_until(lambda: code in [error.code for error in node.emcy.log], f"emergency {code:#06x}")
 
 
 class Sim:
@@ -173,6 +178,6 @@ def follow(node: BaseNode402, step_counts: int, n_cycles: int) -> int:
     """Set a ramp of targets, one after each SYNC; return the last."""
     target = node.rpdo_pointers[0x607A]
     for _ in range(n_cycles):
-        assert node.tpdo[1].wait_for_reception(timeout=2.0) is not None
+        assert node.tpdo[1].wait_for_reception(timeout=PATIENCE_S) is not None
         target.raw += step_counts
     return target.raw

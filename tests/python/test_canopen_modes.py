@@ -11,6 +11,7 @@ import pytest
 from interop_fixture import (
     CELL,
     COUNTS_PER_M,
+    PATIENCE_S,
     START_COUNTS,
     STEP_COUNTS,
     SYNC_S,
@@ -19,6 +20,7 @@ from interop_fixture import (
     enable,
     follow,
     running,
+    wait_for_emergency,
     wait_until,
 )
 
@@ -116,8 +118,8 @@ def test_fault_on_demand_and_reset(eds: Path) -> None:
         node = attach(network, 1, eds)
         enable(network, node, "CYCLIC SYNCHRONOUS POSITION")
         node.sdo.download(0x2002, 0, (0x4310).to_bytes(2, "little"))
-        # `emcy.wait` would miss one that arrives before it starts to wait.
-        wait_until(lambda: [error.code for error in node.emcy.log] == [0x4310], "an emergency")
+        wait_for_emergency(node, 0x4310)
+        assert len(node.emcy.log) == 1
         wait_until(node.is_faulted, "fault")
         assert node.sdo[0x1003][1].raw == 0x4310
         with pytest.raises(canopen.SdoAbortedError) as refusal:
@@ -153,7 +155,7 @@ def test_a_sine_in_cyclic_position(eds: Path) -> None:
         centre = target.raw
         seen = []
         for cycle in range(200):
-            assert node.tpdo[1].wait_for_reception(timeout=2.0) is not None
+            assert node.tpdo[1].wait_for_reception(timeout=PATIENCE_S) is not None
             seen.append(actual(node) - centre)
             target.raw = centre + round(5 * MM * math.sin(2 * math.pi * cycle * SYNC_S))
         assert node.state == "OPERATION ENABLED"

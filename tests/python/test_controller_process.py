@@ -168,7 +168,7 @@ def test_real_time(bench: Bench) -> None:
     """Two runs in real time at 500 Hz: the loop reports its punctuality, and the error falls."""
     cell = bench.cell(short=True, more=PATIENT)
     drives = bench.drives(cell)
-    controller = bench.controller(cell, runs=2)
+    controller = bench.controller(cell, "--simulated-drives", runs=2)
     start = controller.event(event="start")
     assert start["mode"] == "realtime"
     assert {"policy", "priority", "mlock", "kernel", "notes"} <= set(start["rt"])

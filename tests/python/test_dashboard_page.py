@@ -65,9 +65,10 @@ class Watched:
 
     def run(self, runs: int, *more: str) -> Process:
         """Start the controller on the drives, in real time."""
-        argv = ["ilc-rt", "run", self.cell, "--bus", self.bench.bus, "--iterations", str(runs),
-                "--library", self.bench.library, "--events", *more]  # fmt: skip
-        return self.bench.start(*argv)
+        return self.bench.start(
+            "ilc-rt", "run", self.cell, "--bus", self.bench.bus, "--iterations", str(runs),
+            "--library", self.bench.library, "--events", "--simulated-drives", *more,
+        )  # fmt: skip
 
     def page(self, path: str, scheme: str = "light", width: int = 1400) -> Page:
         """Open a page in a browser profile of its own."""

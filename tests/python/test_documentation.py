@@ -164,6 +164,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         drives.line_with("ready")
         controller = Process(argv, folder)
         assert controller.end() == 0, controller.errors
+        controller.close()
     finally:
         drives.close()
     return folder

@@ -52,7 +52,7 @@ def test_a_signal_brings_the_axes_to_rest(
 ) -> None:
     """Mid-run: a controlled stop, drives off, the reason named, the run not kept."""
     drives = bench.drives(patient)
-    controller = bench.controller(patient, "--json", "figures.json", runs=5)
+    controller = bench.controller(patient, "--simulated-drives", "--json", "figures.json", runs=5)
     moving(controller)
     controller.signal(number)
     assert controller.end() == status
@@ -70,7 +70,7 @@ def test_a_signal_under_nohup_is_ignored(bench: Bench, patient: Path) -> None:
     bench.drives(patient)
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        controller = bench.controller(patient, runs=1)
+        controller = bench.controller(patient, "--simulated-drives", runs=1)
     finally:
         signal.signal(signal.SIGHUP, before)
     moving(controller)

@@ -51,7 +51,7 @@ def test_nobody_disturbs_a_campaign_that_is_under_way(bench: Bench) -> None:
     """A second simulator and a second controller exit; every run is kept."""
     cell = bench.cell(short=True, more=PATIENT)
     bench.drives(cell)
-    controller = bench.controller(cell, runs=4)
+    controller = bench.controller(cell, "--simulated-drives", runs=4)
     controller.event(event="state", state="running", iteration=0)
     refused(bench.start("ilc-sim", "run", cell, "--bus", bench.bus), "is on this bus already")
     second = bench.start(
@@ -70,7 +70,8 @@ def test_a_bus_is_free_again_after_a_controller_was_killed(bench: Bench) -> None
     controller = bench.controller(cell, runs=4)
     controller.event(event="state", state="running", iteration=0)
     controller.close()
-    assert bench.controller(cell, "--reset-faults", runs=1).end() == 0
+    again = bench.controller(cell, "--reset-faults", "--simulated-drives", runs=1)
+    assert again.end() == 0, again.errors
 
 
 zenoh = pytest.importorskip("zenoh")
@@ -159,7 +160,7 @@ def test_a_zenoh_bus_and_its_telemetry_stay_on_their_host(
     time.sleep(2.0)
     controller = ours.start(
         "ilc-rt", "run", cell, "--bus", f"zenoh:{key}", "--iterations", "3",
-        "--library", bench.library, "--events",
+        "--library", bench.library, "--events", "--simulated-drives",
     )  # fmt: skip
     try:
         assert controller.end() == 0, controller.errors

@@ -98,7 +98,7 @@ class Watched:
             watcher = Watcher(listen=[ours])
             try:
                 bench.drives(cell)
-                self.controller = start(bench, cell, runs=RUNS)
+                self.controller = start(bench, cell, "--simulated-drives", runs=RUNS)
                 watcher.wait_for_tokens("alive")
                 self.controller.event(event="progress")
                 late = Watcher(connect=[theirs])
@@ -379,11 +379,11 @@ def test_a_hostile_neighbour_changes_nothing_in_the_loop(bench: Bench, pace: str
     runs = 12 if pace == "--lockstep" else 2
     ours = endpoint()
     more = "" if pace == "--lockstep" else PATIENT
-    options = [pace] if pace == "--lockstep" else []
+    options = [pace] if pace == "--lockstep" else ["--simulated-drives"]
     figures = []
     for name, section in (("quiet.toml", ""), ("cell.toml", telemetry(connect=[ours]))):
         cell = bench.cell(short=True, more=more + section, name=name)
-        drives = bench.drives(cell, *options)
+        drives = bench.drives(cell, *(["--lockstep"] if pace == "--lockstep" else []))
         attacker = None
         try:
             if section:

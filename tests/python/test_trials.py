@@ -86,7 +86,7 @@ def test_a_signal_at_any_moment_is_a_controlled_stop(bench: Bench, trial: int) -
     draws = random.Random(trial)
     cell = bench.cell(short=True, more=PATIENT)
     drives = bench.drives(cell)
-    controller = bench.controller(cell, runs=100)
+    controller = bench.controller(cell, "--simulated-drives", runs=100)
     time.sleep(draws.uniform(0.0, 6.0))
     number, status = draws.choice([(signal.SIGINT, 130), (signal.SIGTERM, 143)])
     controller.signal(number)
