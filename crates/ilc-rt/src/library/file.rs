@@ -19,6 +19,9 @@ use crate::record::figure_fields;
 /// Time-out for another writing process: a run that cannot be stored has to stop the axes.
 pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
+/// Looks at a damaged file, each of which a writer may have spoiled by its end.
+const LOOKS_MAX: u32 = 5;
+
 /// The name of a library in memory.
 pub(crate) const IN_MEMORY: &str = ":memory:";
 
@@ -115,15 +118,29 @@ fn metadata(path: &Path) -> Result<Option<Metadata>, LibraryError> {
 /// Connects read-only and examines the file. If no writer has left a log, no side files are created
 /// or needed, so that an archive without write permission can be read; for a file of another
 /// program not even the log is opened.
+///
+/// A writer that ends moves its log into the file; what is read of it meanwhile may not fit together, so a
+/// damaged file is looked at again: by then the log is there, or the file is whole.
 fn look(path: &Path) -> Result<(Connection, Found), LibraryError> {
-    let at_rest = connect(path, true).and_then(|connection| tell(connection, path));
-    let log = std::fs::metadata(beside(path, "-wal"));
-    let is_foreign =
-        matches!(at_rest, Err(LibraryError::Foreign { .. } | LibraryError::Version { .. }));
-    if is_foreign || !log.is_ok_and(|log| log.len() > 0) {
-        return at_rest;
+    let mut n_looks = 0;
+    loop {
+        n_looks += 1;
+        let at_rest = connect(path, true).and_then(|connection| tell(connection, path));
+        let log = std::fs::metadata(beside(path, "-wal"));
+        let is_foreign =
+            matches!(at_rest, Err(LibraryError::Foreign { .. } | LibraryError::Version { .. }));
+        if !is_foreign && log.is_ok_and(|log| log.len() > 0) {
+            return tell(connect(path, false)?, path);
+        }
+        if !is_damaged(&at_rest) || n_looks == LOOKS_MAX {
+            return at_rest;
+        }
     }
-    tell(connect(path, false)?, path)
+}
+
+fn is_damaged<T>(found: &Result<T, LibraryError>) -> bool {
+    let Err(LibraryError::Open { source, .. }) = found else { return false };
+    source.sqlite_error_code() == Some(ErrorCode::DatabaseCorrupt)
 }
 
 fn connect(path: &Path, at_rest: bool) -> Result<Connection, LibraryError> {
@@ -296,6 +313,26 @@ mod tests {
         assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 1);
         assert!(Library::read(&path).unwrap().append(&meta("a"), &record(1)).is_err());
         assert_eq!(folder.names(), ["a #1?.db"]);
+    }
+
+    /// A writer that ends moves its log into the file at any moment of a reader's first look.
+    #[test]
+    fn readers_meet_writers_that_end() {
+        let folder = Folder::new("ends");
+        let path = folder.0.join("ends.db");
+        drop(Library::open(&path).unwrap());
+        std::thread::scope(|scope| {
+            let writer = scope.spawn(|| {
+                for number in 0..150 {
+                    let library = Library::open(&path).unwrap();
+                    library.append(&meta(&number.to_string()), &record(0)).unwrap();
+                }
+            });
+            while !writer.is_finished() {
+                Library::read(&path).unwrap();
+            }
+        });
+        assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 150);
     }
 
     #[test]
