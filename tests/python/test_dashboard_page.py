@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-if find_spec("nicegui") is None:  # Its import is slow, and most workers of pytest never need it.
+# Not imported to find out: that is slow, and most workers of pytest never need it.
+if find_spec("nicegui") is None:
     pytest.skip("nicegui is not installed", allow_module_level=True)
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
