@@ -195,11 +195,11 @@ impl PyLibrary {
     /// Reads from the library.
     pub(crate) fn read<T>(
         &self,
-        work: impl FnOnce(&Library) -> Result<T, LibraryError>,
+        mut work: impl FnMut(&Library) -> Result<T, LibraryError>,
     ) -> Result<T, LibraryError> {
         match &self.0 {
             Held::Memory(library) => work(&library.lock().unwrap_or_else(PoisonError::into_inner)),
-            Held::File(path) => work(&Library::read(path)?),
+            Held::File(path) => Library::read_with(path, work),
         }
     }
 

@@ -75,9 +75,10 @@ fn export(arguments: &ExportArguments) -> Result<Chosen, CampaignError> {
     if !arguments.library.exists() {
         return Err(InputError::NoLibrary { path }.into());
     }
-    let library = Library::read(&arguments.library)?;
-    let chosen = input::choose(&library, &path, arguments.from, (&cell, &plan), |figures| {
-        figures.is_incomplete()
+    let chosen = Library::read_with(&arguments.library, |library| {
+        input::choose(library, &path, arguments.from, (&cell, &plan), |figures| {
+            figures.is_incomplete()
+        })
     })??;
     input::save(&chosen, cell.n_axes(), &arguments.file)?;
     Ok(chosen)

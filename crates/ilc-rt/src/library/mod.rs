@@ -14,6 +14,7 @@ mod listing;
 mod near;
 mod new_run;
 mod once;
+mod reader;
 mod recall;
 mod remove;
 mod row;

@@ -10,6 +10,7 @@ use rusqlite::{CachedStatement, Connection, OptionalExtension, params_from_iter}
 use super::error::{LibraryError, told};
 use super::figures;
 use super::file::{self, BUSY_TIMEOUT, Found};
+use super::reader::{self, AtRest, LOOKS_MAX, Reader};
 use super::row::{Row, is_old, read_row, refresh};
 use super::schema;
 use super::upgrade;
@@ -25,6 +26,8 @@ pub struct Library {
     pub(super) path: String,
     /// Path and identity of the file that runs are written to.
     file: Option<(PathBuf, (u64, u64))>,
+    /// The file as it was found, if it is read without a lock.
+    at_rest: Option<AtRest>,
     /// Schema version of the file; below the newest only if read-only.
     pub(super) version: i64,
     /// Starts of the queries for runs without and with their arrays.
@@ -69,6 +72,7 @@ impl Library {
             connection,
             path: name,
             file: file::identity(path).map(|identity| (path.to_owned(), identity)),
+            at_rest: None,
             version: schema::VERSION,
             queries: OnceCell::new(),
         })
@@ -81,9 +85,31 @@ impl Library {
     /// that is not a library; [`LibraryError::Version`] if it has a later version;
     /// [`LibraryError::Open`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Self, LibraryError> {
-        let (connection, version) = file::reader(path)?;
+        let Reader { connection, version, at_rest } = reader::reader(path)?;
         let (path, queries) = (path.display().to_string(), OnceCell::new());
-        Ok(Self { connection, path, file: None, version, queries })
+        Ok(Self { connection, path, file: None, at_rest, version, queries })
+    }
+
+    /// Reads from a library that others may write to.
+    ///
+    /// A file without a log is read without a lock, so the work is done again if a writer has come
+    /// meanwhile: what it had read may be old, or torn.
+    ///
+    /// # Errors
+    /// As [`Library::read`], and those of the work.
+    pub fn read_with<T>(
+        path: &Path,
+        mut work: impl FnMut(&Self) -> Result<T, LibraryError>,
+    ) -> Result<T, LibraryError> {
+        let mut n_looks = 0;
+        loop {
+            n_looks += 1;
+            let library = Self::read(path)?;
+            let answer = work(&library);
+            if n_looks == LOOKS_MAX || library.at_rest.is_none_or(|at_rest| at_rest.lasts()) {
+                return answer;
+            }
+        }
     }
 
     /// Opens a library in memory, deleted when dropped.
@@ -96,7 +122,7 @@ impl Library {
         let connection = Connection::open_in_memory().map_err(fail)?;
         upgrade::bring_up_to_date(&connection).map_err(fail)?;
         let (version, queries) = (schema::VERSION, OnceCell::new());
-        Ok(Self { connection, path, file: None, version, queries })
+        Ok(Self { connection, path, file: None, at_rest: None, version, queries })
     }
 
     /// Ensures that the file written to is still the one at the path.

@@ -1,5 +1,7 @@
 //! Tests of the library as a whole: stored data are read back.
 
+use std::path::PathBuf;
+
 use super::*;
 use crate::record::{Figures, IterationRecord, Meta};
 
@@ -97,4 +99,30 @@ fn a_file_that_is_no_library_is_refused() {
     let refused = Library::open(&path);
     std::fs::remove_file(&path).unwrap();
     assert!(refused.unwrap_err().to_string().contains("not a database"));
+}
+
+/// A temporary folder, deleted when dropped.
+pub(super) struct Folder(pub(super) PathBuf);
+
+impl Folder {
+    pub(super) fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("ilc-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    pub(super) fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.0).unwrap();
+        let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name();
+        let mut names: Vec<String> =
+            entries.map(|entry| name(entry).to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
 }
