@@ -149,6 +149,8 @@ fn relevance_goes_on_from_the_runs_of_the_library_under_the_disturbance_of_a_fil
     let rms_m = |outcome: &Outcome, run: usize| outcome.runs[run].1.tracking_rms_m;
     let first = start(&cell, 4).unwrap();
     let second = start(&cell, 2).unwrap();
+    // The second campaign begins with what the first one learned.
+    assert!(rms_m(&second, 0) < 0.1 * rms_m(&first, 0), "{first:?} {second:?}");
     assert!(rms_m(&second, 1) < 0.5 * rms_m(&first, 1), "{first:?} {second:?}");
     assert!(rows(&library).iter().all(|row| row.record.disturbance == [20.5]));
 }

@@ -120,8 +120,8 @@ impl Law for Begins {
         Ok(true)
     }
 
-    fn first_input(&self) -> Option<Vec<f64>> {
-        Some((0..64).map(|k| if k % 2 == 0 { 1.5 } else { 0.5 }).collect())
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>, LearningError> {
+        Ok(Some((0..64).map(|k| if k % 2 == 0 { 1.5 } else { 0.5 }).collect()))
     }
 
     fn reset(&mut self) {}
@@ -136,8 +136,8 @@ fn a_filter_begins_with_the_filtered_first_input_of_its_law() {
     let filter = QFilter::low_pass(2, 20.0, 1e-2).unwrap();
     let mut law = Filtered::new(Begins, (64, 1), filter.clone()).unwrap();
     assert!(law.take_over(&[0.0; 64], &[0.0; 64]).unwrap());
-    let mut expected = Begins.first_input().unwrap();
+    let mut expected = Begins.first_input().unwrap().unwrap();
     filter.for_samples(64).unwrap().apply(&mut expected, 1).unwrap();
-    assert_eq!(law.first_input(), Some(expected.clone()));
+    assert_eq!(law.first_input().unwrap(), Some(expected.clone()));
     assert!((expected[32] - 1.0).abs() < 0.1, "{expected:?}");
 }

@@ -145,11 +145,6 @@ fn execute(
         let frozen = Frozen::new(&library, options, cell, &chosen, learns, &mut campaign.plan)?;
         (campaign.frozen, campaign.input) = (Some(frozen), Some(chosen.input));
     }
-    if !options.frozen && !options.resume {
-        let law = campaign.law.as_deref_mut();
-        let own = first_input(&library, options, (cell, &campaign.plan), law, &policy)?;
-        campaign.input = own.or(campaign.input);
-    }
     let (claim, mut resumed) =
         begin_or_resume(&library, cell, options, &mut campaign, &mut policy)?;
     let Campaign { mut plan, law, input, frozen, growth_allowed, law_is_not_run, holds } = campaign;
@@ -308,6 +303,11 @@ fn begin_or_resume(
         let next_disturbance = disturbance.of(0)?;
         if let Some(law) = law.as_deref_mut() {
             set_disturbance(law, &next_disturbance);
+        }
+        if !options.frozen {
+            let law = law.as_deref_mut();
+            let own = first_input(library, options, (cell, plan), law, policy)?;
+            campaign.input = own.or(campaign.input.take());
         }
         Resumed { next_disturbance, ..Resumed::default() }
     };

@@ -1,11 +1,12 @@
-//! Input of the first run of a new campaign, of a law with parameters: its own, or those of another program.
+//! Input of the first run of a new campaign: that of the law, from its parameters or from the runs it
+//! remembers, or of the parameters of another program.
 
 use super::error::CampaignError;
 use super::input::{Task, take_over};
 use super::options::Options;
 use super::rollback::RollbackPolicy;
 use crate::config::Cell;
-use crate::design::Plan;
+use crate::design::{DesignError, Plan};
 use crate::learning::Law;
 use crate::library::Library;
 use crate::record::Figures;
@@ -13,8 +14,8 @@ use crate::record::Figures;
 /// Returns the input that a law begins with; `None` for zero.
 ///
 /// # Errors
-/// [`CampaignError::Input`] if no run of the library fits, or the input is beyond the bounds of the cell;
-/// [`CampaignError::Library`].
+/// [`CampaignError::Input`] if no run of the library fits, or parameters demand an input beyond the
+/// bounds of the cell; [`CampaignError::Library`]; [`CampaignError::Design`] if the law refuses.
 pub(super) fn first_input(
     library: &Library,
     options: &Options,
@@ -27,8 +28,16 @@ pub(super) fn first_input(
         let is_disturbed = |figures: &Figures| policy.is_disturbed(figures);
         return Ok(take_over(library, &path, source, (cell, plan), law, is_disturbed)??);
     }
-    let Some(input) = law.and_then(|law| law.first_input()) else { return Ok(None) };
-    let bounds = plan.input_bounds();
-    Task::new(cell, plan).require_bounds(&input, &bounds, "the parameters of the law")?;
+    let Some(law) = law else { return Ok(None) };
+    let refused = |source| {
+        let file = cell.file.display().to_string();
+        DesignError::Learning { file, source }
+    };
+    let Some(input) = law.first_input().map_err(refused)? else { return Ok(None) };
+    // What a law learned is limited by the loop, as after any run; parameters are a person's.
+    if law.n_disturbances().is_none() {
+        let bounds = plan.input_bounds();
+        Task::new(cell, plan).require_bounds(&input, &bounds, "the parameters of the law")?;
+    }
     Ok(Some(input))
 }

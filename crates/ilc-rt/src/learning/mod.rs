@@ -97,9 +97,13 @@ pub trait Law: Send {
         Ok(false)
     }
 
-    /// Returns the input of the first run of a campaign; `None` for zero, as most laws begin.
-    fn first_input(&self) -> Option<Vec<f64>> {
-        None
+    /// Returns the input of the first run of a campaign, under the disturbance set for it; `None`
+    /// for zero, as most laws begin.
+    ///
+    /// # Errors
+    /// - as [`Law::update`].
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
+        Ok(None)
     }
 
     /// Applies the adjoint (transpose) of the update's linear part: `to_input = L_u' dual`,
@@ -227,7 +231,7 @@ impl<L: Law + ?Sized> Law for Box<L> {
         (**self).take_over(reference, input)
     }
 
-    fn first_input(&self) -> Option<Vec<f64>> {
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
         (**self).first_input()
     }
 

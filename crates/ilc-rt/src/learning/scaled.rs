@@ -67,12 +67,12 @@ impl<L: Law> Law for Scaled<L> {
         self.law.take_over(reference, &self.own)
     }
 
-    fn first_input(&self) -> Option<Vec<f64>> {
-        let mut input = self.law.first_input()?;
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
+        let Some(mut input) = self.law.first_input()? else { return Ok(None) };
         for (value, scale) in input.iter_mut().zip(self.scale.iter().cycle()) {
             *value /= scale;
         }
-        Some(input)
+        Ok(Some(input))
     }
 
     fn reset(&mut self) {

@@ -75,7 +75,7 @@ pub fn take_over(
     }
     let (index, campaign) = (row.record.index, &row.meta.campaign);
     tracing::info!("the law begins with the parameters of run {index} of campaign {campaign}");
-    let Some(input) = law.first_input() else { return Ok(Ok(None)) };
+    let Ok(Some(input)) = law.first_input() else { return Ok(Ok(None)) };
     let bounds = plan.input_bounds();
     let place = format!("parameters of {place}");
     Ok(task.require_bounds(&input, &bounds, &place).map(|()| Some(input)))

@@ -7,7 +7,7 @@ use crate::campaign::collect::Collector;
 use crate::campaign::learner::learn;
 use crate::campaign::rollback::{Decision, RollbackPolicy};
 use crate::config::Cell;
-use crate::design::Plan;
+use crate::design::{DesignError, Plan};
 use crate::learning::{Law, Purpose};
 use crate::record::{AxisKinds, IterationRecord};
 use crate::recording::LoopSetup;
@@ -28,11 +28,17 @@ pub(super) struct Relearned {
 
 impl Relearned {
     pub(super) fn new(setup: &LoopSetup, cell: &Cell, plan: &Plan) -> Result<Self, ReplayError> {
-        let law = match &setup.law_is_not_run {
+        let mut law = match &setup.law_is_not_run {
             Some(_) => None,
             None => plan.law(cell)?.law,
         };
-        let own = law.as_deref().and_then(Law::first_input);
+        let own = match law.as_deref_mut() {
+            Some(law) => law.first_input().map_err(|source| {
+                let file = cell.file.display().to_string();
+                DesignError::Learning { file, source }
+            })?,
+            None => None,
+        };
         let mut policy =
             RollbackPolicy::new(setup.growth_allowed).forgiving(setup.forgives_overruns);
         if own.is_some() {

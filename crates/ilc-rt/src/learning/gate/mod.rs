@@ -187,7 +187,7 @@ impl<L: Law> Law for Gate<L> {
         self.law.take_over(reference, input)
     }
 
-    fn first_input(&self) -> Option<Vec<f64>> {
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
         self.law.first_input()
     }
 

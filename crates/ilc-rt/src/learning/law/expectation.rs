@@ -55,6 +55,11 @@ impl Expectation {
         self.is_new = true;
     }
 
+    /// Returns the disturbance of the coming run, if it is known.
+    pub(super) fn coming(&self) -> Option<&[f64]> {
+        self.coming.as_deref().filter(|_| self.refused.is_none())
+    }
+
     /// Returns the disturbances of the finished run, if it is known, and of the coming one; then
     /// the coming run begins.
     pub(super) fn settle(&mut self) -> Result<(Option<&[f64]>, &[f64])> {

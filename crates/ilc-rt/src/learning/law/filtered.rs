@@ -136,11 +136,11 @@ impl<L: Law> Law for Filtered<L> {
         self.law.take_over(reference, input)
     }
 
-    fn first_input(&self) -> Option<Vec<f64>> {
-        let mut input = self.law.first_input()?;
-        let mut runner = self.q_filter.for_samples(self.n_samples).ok()?;
-        runner.apply(&mut input, self.n_inputs).ok()?;
-        Some(input)
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
+        let Some(mut input) = self.law.first_input()? else { return Ok(None) };
+        let mut runner = self.q_filter.for_samples(self.n_samples)?;
+        runner.apply(&mut input, self.n_inputs)?;
+        Ok(Some(input))
     }
 
     fn reset(&mut self) {

@@ -197,6 +197,18 @@ impl Flexible {
         (0..self.len()).min_by(|&a, &b| of(a).total_cmp(&of(b)))
     }
 
+    /// Writes the input of the table for a disturbance; false if the table is empty.
+    fn look_up(&self, disturbance: &[f64], next: &mut [f64]) -> bool {
+        let Some(a) = self.nearest(disturbance) else { return false };
+        next.copy_from_slice(self.inputs.row(a));
+        if let Some((b, share)) = self.beyond(a, disturbance) {
+            for (next, towards) in next.iter_mut().zip(self.inputs.row(b)) {
+                *next += share * (towards - *next);
+            }
+        }
+        true
+    }
+
     /// Returns the nearest entry on the other side of a disturbance than `a`, and the interpolation
     /// factor.
     fn beyond(&self, a: usize, disturbance: &[f64]) -> Option<(usize, f64)> {
@@ -234,15 +246,9 @@ impl Law for Flexible {
         if let Some(finished) = finished {
             self.enter(&finished);
         }
-        let Some(a) = self.nearest(&coming) else {
+        if !self.look_up(&coming, next) {
             next.copy_from_slice(&self.proposal);
             return Ok(());
-        };
-        next.copy_from_slice(self.inputs.row(a));
-        if let Some((b, share)) = self.beyond(a, &coming) {
-            for (next, towards) in next.iter_mut().zip(self.inputs.row(b)) {
-                *next += share * (towards - *next);
-            }
         }
         check("next", next, n_samples, n_inputs)
     }
@@ -263,6 +269,13 @@ impl Law for Flexible {
 
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.remember(input, error, disturbance).map(|()| true)
+    }
+
+    /// The input of the table, from the runs in memory.
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
+        let Some(coming) = self.told.coming() else { return Ok(None) };
+        let mut input = vec![0.0; self.shape.n_samples * self.shape.n_inputs];
+        Ok(self.look_up(coming, &mut input).then_some(input))
     }
 
     fn reset(&mut self) {
@@ -324,6 +337,19 @@ mod tests {
             assert!((next_at(&mut law, &[d]) - u).abs() < 1e-12, "at {d}");
         }
         assert_eq!(law.len(), 3);
+    }
+
+    #[test]
+    fn the_first_input_is_that_of_the_table() {
+        let mut law = law(1, 0.0);
+        law.set_disturbance(&[0.25]);
+        assert_eq!(law.first_input().unwrap(), None, "nothing is in the table");
+        for (d, u) in [(0.0, 10.0), (1.0, 20.0)] {
+            law.remember(&[u], &[1.0], &[d]).unwrap();
+        }
+        assert_eq!(law.first_input().unwrap(), Some(vec![13.5]));
+        law.told.forget();
+        assert_eq!(law.first_input().unwrap(), None, "the disturbance is not known");
     }
 
     #[test]

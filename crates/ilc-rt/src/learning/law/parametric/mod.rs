@@ -245,13 +245,13 @@ impl Law for Parametric {
         Ok(true)
     }
 
-    fn first_input(&self) -> Option<Vec<f64>> {
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
         if self.start.iter().all(|value| *value == 0.0) {
-            return None;
+            return Ok(None);
         }
         let mut input = vec![0.0; self.n_samples * self.n_inputs];
         self.input_of(&self.start, &mut input);
-        Some(input)
+        Ok(Some(input))
     }
 
     fn status(&self) -> Option<String> {

@@ -370,6 +370,17 @@ impl Law for Relevance {
         self.remember(input, error, disturbance).map(|()| true)
     }
 
+    /// The weighted mean of the runs in memory.
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>> {
+        let Some(coming) = self.told.coming().map(<[f64]>::to_vec) else { return Ok(None) };
+        let mut input = vec![0.0; self.shape.n_samples * self.shape.n_inputs];
+        if !self.is_empty() {
+            self.weigh(&coming, &mut input)?;
+        }
+        // Runs may have left their shelf.
+        Ok((!self.is_empty()).then_some(input))
+    }
+
     fn reset(&mut self) {
         self.core.reset();
         self.told.forget();

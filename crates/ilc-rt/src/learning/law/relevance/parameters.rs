@@ -16,7 +16,7 @@ use crate::schema::{Violation, field_order};
 ///
 /// Each run counts by `1 / (sum of the weighted squares of its error, of the error's rate and of
 /// the distance of its disturbance from the coming one + epsilon)`. The runs of this cell, program
-/// and measurement in the library are added at the start.
+/// and measurement in the library are added at the start, and give the input of the first run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]

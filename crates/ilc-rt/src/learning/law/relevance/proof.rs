@@ -204,6 +204,27 @@ fn channels_count_together_and_do_not_mix() {
 }
 
 #[test]
+fn the_first_input_is_the_weighted_mean_of_what_is_remembered() {
+    let weights = RelevanceWeights { error_rate: 0.0, ..Default::default() };
+    for top in [None, Some(1)] {
+        let mut law =
+            Relevance::new(pd(1.0, 0.0, 2, 1), shape(2, 1, 1), weights.clone(), top).unwrap();
+        law.set_disturbance(&[21.0]);
+        assert_eq!(law.first_input().unwrap(), None, "nothing is remembered");
+        for (u, d) in [(1.0, 20.0), (2.0, 30.0)] {
+            law.remember(&[u; 2], &[0.1; 2], &[d]).unwrap();
+        }
+        let shares = law.relevant(&[21.0]).unwrap();
+        let expected: f64 = shares.iter().map(|(run, share)| share * [1.1, 2.1][*run]).sum();
+        close(&law.first_input().unwrap().unwrap(), &[expected; 2]);
+        assert_eq!(law.len(), 2);
+        law.reset();
+        law.remember(&[1.0; 2], &[0.1; 2], &[20.0]).unwrap();
+        assert_eq!(law.first_input().unwrap(), None, "the disturbance is not known");
+    }
+}
+
+#[test]
 fn runs_that_pass_through_again_are_counted_once() {
     let mut law =
         Relevance::new(pd(1.0, 0.0, 2, 1), shape(2, 1, 1), RelevanceWeights::default(), None)
