@@ -23,7 +23,7 @@ NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt rt-page deb vcan clean
+.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak trials check fmt lint docs bench rt instructions rt-page deb vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -93,8 +93,12 @@ test-python: $(VENV)/.test $(VENV)/.docs ## Python tests
 fuzz: $(VENV)/.test ## New problems for FUZZ_S seconds (60): property tests, readers, the border to Python
 	FUZZ_S="$(FUZZ_S)" FUZZ_SEED="$(FUZZ_SEED)" $(BIN)/python tests/fuzz/run.py
 
-soak: $(VENV)/.test ## Kills, full disks, strangers and a stalling computer, SOAK times (20) as many: long, with a tally
-	ILC_SOAK="$(or $(SOAK),20)" $(BIN)/python -m pytest -q tests/python/test_trials.py
+soak: $(VENV)/.test ## Ten million ticks, then a cell by the clock for SOAK_S seconds (1200): nothing may grow or stop
+	cargo test --release --workspace --test no_alloc -- --ignored --nocapture
+	$(BIN)/python tests/soak/endurance.py --seconds "$(or $(SOAK_S),1200)"
+
+trials: $(VENV)/.test ## Kills, full disks, strangers and a stalling computer, TRIALS times (20) as many: long, with a tally
+	ILC_TRIALS="$(or $(TRIALS),20)" $(BIN)/python -m pytest -q tests/python/test_trials.py
 	$(BIN)/python tests/soak/demo.py stalls --times 10
 	$(BIN)/python tests/soak/demo.py load --times 40
 	$(BIN)/python tests/soak/demo.py kills --times 20
@@ -134,6 +138,9 @@ bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md
 rt: build ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
 	cargo nextest run --release --workspace -E 'binary(no_alloc) | binary(no_alloc_learning) | binary(lockstep)'
 	$(BIN)/ilc-rt latency --seconds 5
+
+instructions: $(VENV)/.built ## Instructions of a tick by callgrind (Debian: valgrind), beside the stored figures
+	$(BIN)/python benchmarks/instructions.py
 
 rt-page: build ## Measure this computer's punctuality, RT_SECONDS (20) a part, and write its page into docs/machines
 	$(BIN)/python benchmarks/machine_page.py

@@ -126,15 +126,15 @@ def many_plants() -> list[str]:
 
 
 def many_plants_section(rows: list[dict[str, Any]]) -> list[str]:
-    """Return the section from the rows of `many_plants.py`, the first two being one and two threads."""
+    """Return the section from the rows of `many_plants.py`: one and two threads come first."""
     each_s = [row["seconds"] / row["plants"] for row in rows]
     ratio = rows[0]["seconds"] / rows[1]["seconds"]
     return [
         "## Thousands of plants",
         "",
-        "20 runs of 1300 samples with noise on each of many plants that differ from the model (second order),",
-        "norm-optimal; every way gives the same figures bit by bit. Two threads are worth "
-        f"{ratio:.2f} of one.",
+        "20 runs of 1300 samples with noise on each of many plants that differ from the model",
+        "(second order), norm-optimal; every way gives the same figures bit by bit. Two threads "
+        f"are worth {ratio:.2f} of one.",
         "",
         "| way | plants | time | per plant | times ours |",
         "|---|--:|--:|--:|--:|",

@@ -143,8 +143,8 @@ def attach(network: canopen.Network, number: int, eds: Path) -> BaseNode402:
     """Reset a drive, wait for its boot-up, and return it."""
     node = BaseNode402(number, str(eds))
     network.add_node(node)
-    # python-can hears its own multicast, on a busy machine after the answer to it: a command that is
-    # taken for another master's would then undo the state that the answer has told.
+    # python-can hears its own multicast, on a busy machine after the answer to it: its own command,
+    # taken for another master's, would then undo the state that the answer has told.
     network.unsubscribe(0, node.nmt.on_command)
     # The defaults, 0.2 to 0.8 s, are too short on a busy machine.
     node.sdo.RESPONSE_TIMEOUT = 2.0

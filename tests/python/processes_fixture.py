@@ -143,6 +143,11 @@ class Process:
         """All events that were read."""
         return [json.loads(line) for line in self.said]
 
+    @property
+    def is_running(self) -> bool:
+        """True until the program has ended."""
+        return self._process.poll() is None
+
     def signal(self, number: int) -> None:
         """Send a signal."""
         self._process.send_signal(number)

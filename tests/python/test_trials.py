@@ -1,7 +1,7 @@
 """Randomised trials of failures: kills, full disks, damaged files, babble, foreign nodes.
 
-A few trials are made here, and many by `make soak` (`ILC_SOAK`, a factor). Random draws depend on
-the number of the trial alone.
+A few trials are made here, and many by `make trials` (`ILC_TRIALS`, a factor). Random draws depend
+on the number of the trial alone.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
     from ilc_rt import CampaignResult
 
-FACTOR = int(os.environ.get("ILC_SOAK", "1"))
+FACTOR = int(os.environ.get("ILC_TRIALS", "1"))
 BOTH_OFF = "1 (x) switch on disabled, 2 (y) switch on disabled"
 
 pytestmark = pytest.mark.timeout(120 * FACTOR)
 
 
 def trials(n: int) -> range:
-    """Return the numbers of `n` trials, of more under `make soak`."""
+    """Return the numbers of `n` trials, of more under `make trials`."""
     return range(n * FACTOR)
 
 

@@ -18,7 +18,7 @@ use ilc_rt::fieldbus::canopen::NmtCommand;
 use ilc_rt::fieldbus::transport::Responder;
 use ilc_rt::rt::{Clock, MonotonicClock, Nanos};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
-use ilc_tests::counting::{Counting, allocations, deallocations};
+use ilc_tests::counting::{Counting, allocations, deallocations, live_bytes};
 use ilc_tests::rig::{Rig, node, write_object};
 use ilc_tests::short;
 
@@ -129,6 +129,24 @@ fn whole_campaigns_with_swapped_tables() {
         assert_eq!(watched.phases, BTreeSet::from(expected));
         println!("{name}: {} ticks", watched.n_ticks);
     }
+}
+
+/// Five hours and a half of the gantry. `make soak` makes them.
+#[test]
+#[ignore = "takes a minute"]
+fn ten_million_ticks_without_a_byte_of_growth() {
+    const ROUND: u32 = 100_000;
+    let mut watched = Watched::new(&short(CELLS[0]), u32::MAX);
+    let mut first = None;
+    for _ in 0..100 {
+        for _ in 0..ROUND {
+            assert_eq!(watched.tick(0), TickStatus::Running, "{:?}", watched.rig.reason);
+        }
+        watched.rig.forget();
+        let bytes = live_bytes();
+        assert_eq!(bytes, *first.get_or_insert(bytes), "after {} ticks", watched.n_ticks);
+    }
+    println!("{} ticks, {:?} bytes", watched.n_ticks, first);
 }
 
 #[test]
