@@ -248,7 +248,7 @@ def test_a_cell_starts_from_what_another_learned(
 def test_a_fresh_campaign_recalls_what_was_fetched(
     address: str, gantry: Path, tmp_path: Path, disturbances: int
 ) -> None:
-    """A law that weighs runs uses those of the other cell after its own first run."""
+    """A law that weighs runs begins with those of the other cell."""
     example = gantry.with_name("07_warm_and_cold.toml").read_text(encoding="utf-8")
     example = example.replace("disturbances = 1", f"disturbances = {disturbances}")
     if disturbances == 0:
@@ -267,10 +267,9 @@ def test_a_fresh_campaign_recalls_what_was_fetched(
         campaign = Campaign(cell, library=tmp_path / library, disturbance=measured)
         told[library] = [record.tracking_rms_m for record in campaign.run(n_runs)]
     taught, alone, learned = told["second.db"], told["alone.db"], told["first.db"]
-    assert taught[0] == alone[0] == learned[0], "the first run of a campaign has no input"
-    assert alone[1] == learned[1]
-    # As good as the fifth run of the other cell, in the second.
-    assert taught[1] < 1.1 * learned[4] < 0.9 * alone[1]
+    assert alone == learned[:2], "nothing is known: the first run has no input"
+    # As good as the fifth run of the other cell, from the first on.
+    assert max(taught) < 1.1 * learned[4] < 0.9 * alone[1]
 
 
 @pytest.mark.parametrize(
