@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 import queue
+import re
 import socket
 import time
 import types
@@ -44,6 +45,9 @@ PAST_TOPICS = {
     "fault": "fault", "inputs": "inputs", "drives": "drives",
 }  # fmt: skip
 TEXT_MAX = 2_000
+EVERY_CELL = "*"
+#: As cell descriptions allow them.
+CELL_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +98,7 @@ class Monitor(Closing):
     Raises
     ------
     BadInputError
-        If an endpoint is invalid.
+        If an endpoint is invalid, or no cell can have this name.
     CampaignError
         If no Zenoh session can be opened.
 
@@ -113,10 +117,7 @@ class Monitor(Closing):
         scouting: bool = True,
         router: bool = False,
     ) -> None:
-        if not cell or any(sign in cell for sign in "/#?$ "):
-            message = f"cell = {cell!r}: a name without / # ? $, or * for every cell"
-            raise BadInputError(message)
-        self._cell = cell
+        self._cell = checked_name(cell)
         self._queue: queue.Queue[Message] = queue.Queue(QUEUE_MAX)
         self._lost = 0
         # Messages of the past that may still arrive once more.
@@ -217,6 +218,28 @@ class Monitor(Closing):
             self._queue.put_nowait(message)
         except queue.Full:
             self._lost += 1
+
+
+def checked_name(cell: str) -> str:
+    """Return a name that a cell can have, or ``*`` for every cell.
+
+    Raises
+    ------
+    BadInputError
+        If no cell can have it.
+
+    Examples
+    --------
+    >>> checked_name("press-7")
+    'press-7'
+    """
+    if cell != EVERY_CELL and CELL_NAME.fullmatch(cell) is None:
+        message = (
+            f"cell = {_clean(cell)!r}: 1 to 64 letters, digits, - and _, the TOML file of a cell, "
+            "or * for every cell"
+        )
+        raise BadInputError(message)
+    return cell
 
 
 def _open(connect: Sequence[str], *, scouting: bool, router: bool) -> zenoh.Session:

@@ -11,6 +11,7 @@ import json
 import time
 from typing import TYPE_CHECKING, Any
 
+from ilc_rt.addresses import reached, unusable
 from ilc_rt.bridge.signals import Cells
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
@@ -67,8 +68,10 @@ class Foxglove(Closing):
                 name="ilc-rt", host=host, port=port, context=self._context
             )
         except RuntimeError as error:
-            message = f"{host}:{port}: {error}"
-            raise BadInputError(message) from error
+            # As "FoxgloveError: Failed to bind port: Address already in use (os error 98)".
+            reason = str(error).rpartition(": ")[2].partition(" (os error")[0]
+            raise BadInputError(unusable(host, port, reason)) from error
+        self._host = host
         self._channels: dict[str, foxglove.Channel] = {}
         self._cells = Cells(described, recall)
 
@@ -79,7 +82,7 @@ class Foxglove(Closing):
     @property
     def address(self) -> str:
         """Address to type in Foxglove, as ``ws://127.0.0.1:8765``."""
-        return f"ws://127.0.0.1:{self._server.port}"
+        return f"ws://{reached(self._host, self._server.port)}"
 
     def show(self, message: Message) -> None:
         """Send on what a message has."""
