@@ -1,4 +1,4 @@
-"""What the verbs that hear controllers refuse: one line, exit code 2, whichever verb it is."""
+"""Refusals of the verbs that hear controllers: one line, exit code 2, whichever verb it is."""
 
 from __future__ import annotations
 

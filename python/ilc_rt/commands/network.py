@@ -69,7 +69,7 @@ def listen(cell: str, connect: list[str] | None, *, scouting: bool, router: bool
 
 
 def remembering(libraries: list[str] | None) -> Memory:
-    """Return the memory of some libraries; one that does not exist yet is told.
+    """Return the memory of some libraries; one that does not exist yet is reported.
 
     Raises
     ------
