@@ -111,6 +111,24 @@ def test_rules_keep_the_newest_and_the_best(library: Library) -> None:
         library.retain(days=-1)
 
 
+def test_runs_are_deleted_in_batches_that_are_told(
+    library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No writer waits for all of them; oldest first, so that the rest is a library, too."""
+    monkeypatch.setattr("ilc_rt.library.DELETED_AT_ONCE", 4)
+    told: list[tuple[int, int]] = []
+    left: list[list[int]] = []
+
+    def tell(done: int, total: int) -> None:
+        told.append((done, total))
+        left.append([run["id"] for run in library])
+
+    assert library.retain(newest=2, progress=tell) == 10
+    assert told == [(0, 10), (4, 10), (8, 10)]
+    assert left == [list(range(1, 13)), list(range(5, 13)), list(range(9, 13))]
+    assert [run["id"] for run in library] == [11, 12]
+
+
 def test_age_counts_from_now_and_the_newest_run_of_a_campaign_stays() -> None:
     from datetime import datetime, timezone
 

@@ -20,6 +20,7 @@ from ilc_rt.commands.options import (
     JsonFile,
     LibraryArgument,
 )
+from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, unit_for
@@ -258,12 +259,20 @@ def trim(
         raise BadInputError(message)
     n_runs = len(existing(library))
     try:
-        if keep is not None:
-            deleted = Library(str(library)).trim(min(keep, n_runs), cell)
-        else:
-            deleted = Library(str(library)).retain(newest=newest, days=days, best=best, cell=cell)
+        with Steps("runs deleted") as steps:
+            if keep is not None:
+                with steps.clocked(f"weighing {n_runs} runs and deleting the least relevant"):
+                    deleted = Library(str(library)).trim(min(keep, n_runs), cell)
+            else:
+                deleted = Library(str(library)).retain(
+                    newest=newest, days=days, best=best, cell=cell, progress=steps.tell
+                )
     except OSError as error:
         raise BadInputError(str(error)) from error
+    except KeyboardInterrupt:
+        left = len(existing(library))
+        typer.echo(f"ilc: stopped; {n_runs - left} runs are deleted, {left} are there", err=True)
+        raise
     if json_file is not None:
         write_text(json_file, json_text({"deleted": deleted}))
     typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
