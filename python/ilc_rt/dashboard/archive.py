@@ -146,6 +146,14 @@ class Archive(Closing):
             self._loaded.move_to_end(cached)
             return StoredRun(key, self._loaded[cached])
 
+    def why_not(self, key: tuple[int, int]) -> str | None:
+        """Return in words why a run cannot be read; None if it can."""
+        try:
+            self.load(key)
+        except BadInputError as error:
+            return str(error)
+        return None
+
     def capture(self, cell: str, campaign: str | None) -> Capture | None:
         """Return the signals of the newest stored run of a campaign, as if they had been heard."""
         try:

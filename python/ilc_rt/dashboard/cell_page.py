@@ -50,8 +50,10 @@ LIVE = {
 
 def build_cell(fleet: Fleet, archive: Archive, name: str) -> None:
     """Build the page of a cell."""
-    with page_frame(f"/cell/{name}"):
+    with page_frame(f"/cell/{name}", printable(name, 64)):
         if name not in fleet.cells:
+            with tag("h1", "unseen"):
+                text(printable(name))
             with tag("p", "empty"):
                 text(f"No cell {printable(name)} is watched; this page waits for it.")
             ui.timer(1.0, lambda: _reload_if(name in fleet.cells))

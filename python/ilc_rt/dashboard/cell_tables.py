@@ -33,7 +33,8 @@ class AxisTable:
     """State and figures of each axis."""
 
     def __init__(self) -> None:
-        with tag("div", "scroll"), tag("table", "plain-table"):
+        place = tag("div", "scroll", tabindex="0", role="region", aria_label="Figures of the axes")
+        with place, tag("table", "plain-table"):
             with tag("thead"), tag("tr"):
                 for column in COLUMNS:
                     with tag("th", "text" if column in WORDS else "", scope="col"):
