@@ -18,6 +18,7 @@ from ilc_rt.commands.network import (
     tell_others,
 )
 from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
+from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.monitor import EVERY_CELL
 
@@ -60,8 +61,10 @@ def dashboard(
     for name, cell in known:
         if cell is not None:
             fleet.cells[name].describe(cell)
+    with Steps("libraries").clocked("reading the libraries"):
+        opened = Archive(_libraries(library))
     with (
-        Archive(_libraries(library)) as archive,
+        opened as archive,
         server.listen(host, port) as listener,
         Feed(fleet, archive, connect or (), scouting=scouting, router=router),
     ):

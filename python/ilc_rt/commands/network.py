@@ -14,13 +14,13 @@ from ilc_rt.addresses import is_local
 from ilc_rt.campaign import load_cell
 from ilc_rt.errors import BadInputError
 from ilc_rt.monitor import EVERY_CELL, Monitor, checked_name
-from ilc_rt.sources import Memory
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from ilc_rt import Cell
+    from ilc_rt.sources import Memory
 
 #: A year.
 DURATION_MAX_S = 366 * 86_400.0
@@ -76,6 +76,9 @@ def remembering(libraries: list[str] | None) -> Memory:
     BadInputError
         If a file is not a library, or a database cannot be read.
     """
+    # Only here: `library` starts without NumPy, which a fleet database needs.
+    from ilc_rt.sources import Memory
+
     memory = Memory(libraries or ())
     try:
         missing = memory.missing()
