@@ -17,14 +17,13 @@ import queue
 import re
 import socket
 import time
-import types
-import typing
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import SCHEMA, EventError, StartEvent, parse_event
+from ilc_rt.misfit import misfit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -311,9 +310,9 @@ def _message(sample: zenoh.Sample) -> Message | None:
         event = parse_event(json.dumps({"event": topic, **payload}))
     except EventError as error:
         return Message(cell, topic, payload, warning=_clean(f"a message left out: {error}"))
-    misfit = None if event is None else _misfit(event)
-    if misfit is not None:
-        return Message(cell, topic, payload, warning=f"a message left out: {misfit}")
+    found = None if event is None else misfit(event)
+    if found is not None:
+        return Message(cell, topic, payload, warning=_clean(f"a message left out: {found}"))
     warning = None
     if isinstance(event, StartEvent) and event.schema > SCHEMA:
         warning = (
@@ -341,37 +340,3 @@ def _clean_all(value: object) -> object:
     if isinstance(value, list):
         return [_clean_all(item) for item in value]
     return value
-
-
-def _misfit(event: object) -> str | None:
-    """Return the name of a field of a typed object with a value of the wrong type."""
-    hints = typing.get_type_hints(type(event))
-    for field in fields(event):  # type: ignore[arg-type]
-        value = getattr(event, field.name)
-        if is_dataclass(value):
-            inner = _misfit(value)
-            if inner is not None:
-                return f"{field.name}: {inner}"
-        elif not _fits(value, hints[field.name]):
-            return f"{field.name} = {str(value)[:80]} is not of its type"
-    return None
-
-
-def _fits(value: object, hint: object) -> bool:
-    """Return whether a value has the annotated type; numbers must be finite."""
-    origin = typing.get_origin(hint)
-    if origin in {typing.Union, types.UnionType}:
-        return any(_fits(value, one) for one in typing.get_args(hint))
-    if origin is tuple:
-        kinds = typing.get_args(hint)
-        if not isinstance(value, tuple):
-            return False
-        if len(kinds) == 2 and kinds[1] is Ellipsis:
-            return all(_fits(item, kinds[0]) for item in value)
-        return len(value) == len(kinds) and all(map(_fits, value, kinds))
-    if hint in {int, float}:
-        allowed = int if hint is int else (int, float)
-        if isinstance(value, bool) or not isinstance(value, allowed):
-            return False
-        return abs(value) < 1e300 if isinstance(value, int) else math.isfinite(value)
-    return isinstance(hint, type) and isinstance(value, hint)

@@ -16,6 +16,7 @@ from ilc_rt.bridge.signals import Cells
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import EndEvent, FaultEvent, IterationEvent, StartEvent, StateEvent
+from ilc_rt.misfit import is_number
 from ilc_rt.wording import WORDS, describe
 
 if TYPE_CHECKING:
@@ -92,11 +93,7 @@ class Foxglove(Closing):
                 self._log(f"/{message.cell}/{axis}", {**run, **signals}, row.time_s)
         event = message.event
         if isinstance(event, IterationEvent):
-            figures = {
-                key: value
-                for key, value in message.payload.items()
-                if isinstance(value, (int, float)) and not isinstance(value, bool)
-            }
+            figures = {key: value for key, value in message.payload.items() if is_number(value)}
             self._log(f"/{message.cell}/iteration", figures, time.time())
         words = _words(event)
         if words is not None:

@@ -152,7 +152,8 @@ def _small(value: float | None, base: str) -> str:
     """Return an error or an input in millionths, which change in size as they move."""
     if value is None:
         return "-"
-    return f"{_plain(1e6 * value, 1)} µ{base}" if base[0] in "mr" else f"{value:.4g} {base}"
+    is_motion = base.startswith(("m", "r"))
+    return f"{_plain(1e6 * value, 1)} µ{base}" if is_motion else f"{value:.4g} {base}"
 
 
 def _plain(value: float, digits: int) -> str:

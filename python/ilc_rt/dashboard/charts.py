@@ -79,7 +79,8 @@ def live(cell: CellModel, what: str) -> Option:
     """
     option = frame("s", "") | words("no signals yet; in lock-step a cell sends none")
     units = cell.input_units if what == "input" else cell.units
-    groups = list(dict.fromkeys(units))[:2]
+    # The first unit has the left axis, all others share the right one.
+    groups = list(dict.fromkeys(units))
     option["yAxis"] = [
         _axis("") | {"position": side} for side in ("left", "right")[: max(1, len(groups))]
     ]
