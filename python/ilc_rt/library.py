@@ -11,7 +11,7 @@ from ilc_rt import _native
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.given import given
-from ilc_rt.retention import kept_by, selected
+from ilc_rt.retention import DESCRIPTIONS, kept_by, selected, with_descriptions
 
 if TYPE_CHECKING:
     import builtins
@@ -145,7 +145,9 @@ class Library(Closing, _native.Library):
         Parameters
         ----------
         **wanted
-            By keys of `list`. A pair of numbers, or of texts, is a range with both ends, either
+            By keys of `list`, and by ``program`` and ``law_parameters`` of `load`, as JSON text or
+            as what it means; these two are read with the arrays of the runs that the other keys
+            leave. A pair of numbers, or of texts, is a range with both ends, either
             of which may be None; any other value is compared. Dates are compared as texts, so
             ``created_utc=("2026-11", None)`` has all runs from November 2026 on. A vector of
             disturbances is in a range if each of its elements is.
@@ -169,7 +171,8 @@ class Library(Closing, _native.Library):
         >>> library.select(cell="gantry", disturbance=(20.0, 25.0), created_utc=("2026-11", None))
         []
         """
-        return selected(self.list(), wanted)
+        described = {key: wanted.pop(key) for key in DESCRIPTIONS if key in wanted}
+        return with_descriptions(selected(self.list(), wanted), described, self._rows)
 
     def to_dataframe(self, **wanted: Any) -> Any:  # noqa: ANN401 (pandas is optional)
         """Return the runs as a table of pandas, one row per run; `wanted` as for `select`.
