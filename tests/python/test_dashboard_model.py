@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -330,6 +332,26 @@ def test_notes_are_kept_beside_the_library(tmp_path: Path) -> None:
     with pytest.raises(BadInputError):
         write_note(library, "c1/3", "not lost")
     assert notes_file(library).read_text() == "[1]"
+
+
+def test_dashboards_beside_each_other_lose_no_note(tmp_path: Path) -> None:
+    """Two processes that write at the same time, each notes of its own."""
+    code = (
+        "import sys; from pathlib import Path; from ilc_rt.dashboard.notes import write_note\n"
+        "sys.stdin.read(1)\n"
+        "for number in range(40): write_note(Path('l.db'), f'{sys.argv[1]}/{number}', 'seen')"
+    )
+    writers = [
+        subprocess.Popen([sys.executable, "-c", code, name], cwd=tmp_path, stdin=subprocess.PIPE)
+        for name in ("a", "b")
+    ]
+    for writer in writers:
+        assert writer.stdin is not None
+        writer.stdin.write(b"!")
+        writer.stdin.close()
+    assert [writer.wait(60.0) for writer in writers] == [0, 0]
+    assert len(read_notes(tmp_path / "l.db")) == 80
+    assert [path.name for path in tmp_path.iterdir()] == ["l.db.notes.json"]
 
 
 def test_a_flight_record_beside_the_library_tells_who_was_late(tmp_path: Path) -> None:
