@@ -177,7 +177,9 @@ class CellView:
                 with tag("h1"):
                     text(printable(self._cell.name))
                 self._state = text("", "state", "state")
-                self._state.props["role"] = "status"
+                # A screen reader hears what has changed, not every second of a silence.
+                self._spoken = text("", "unseen", "spoken")
+                self._spoken.props["role"] = "status"
                 self._task = text("", "quiet end", "task")
             with tag("div", "facts"):
                 self._run = fact("run", "run")
@@ -236,6 +238,7 @@ class CellView:
         cell = self._cell
         status = cell.status(now_s)
         say(self._state, f"{status.symbol} {status.words}")
+        say(self._spoken, status.words.partition(" since ")[0])
         level(self._panel, status.level)
         say(self._task, _task(cell))
         say(self._run, run_words(cell))
