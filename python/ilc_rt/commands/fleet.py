@@ -99,7 +99,7 @@ def collect(
     ):
         typer.echo("collecting; Ctrl-C ends this, not the machines", err=True)
         warned: set[str] = set()
-        was_waiting = False
+        was_waiting, was_refused = False, None
         try:
             for message in seen.messages(timeout):
                 collector.take(message)
@@ -109,6 +109,9 @@ def collect(
                         f"{printable(name)}: its campaign began before; sync brings its runs",
                         err=True,
                     )
+                if collector.refused != was_refused:
+                    was_refused = collector.refused
+                    typer.echo(f"left out: {printable(was_refused)}", err=True)
                 if bool(collector.n_waiting) != was_waiting:
                     was_waiting = not was_waiting
                     state = "cannot be reached: runs wait" if was_waiting else "is there again"
