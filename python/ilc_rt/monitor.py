@@ -18,6 +18,7 @@ import re
 import socket
 import time
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ilc_rt.closing import Closing
@@ -38,6 +39,8 @@ _T = TypeVar("_T")
 POLL_S = 0.2
 QUEUE_MAX = 10_000
 PAYLOAD_MAX_BYTES = 1 << 20
+#: Of a question to a cell; a controller gives 1,000 events and a few states, anyone may answer.
+REPLIES_MAX = 5_000
 # Topic under which an event of the history was published.
 PAST_TOPICS = {
     "start": "state", "iteration": "iteration", "judged": "iteration", "drift": "iteration",
@@ -171,7 +174,7 @@ class Monitor(Closing):
             consolidation=ConsolidationMode.NONE,
         )
         found: list[tuple[float, Message]] = []
-        for reply in replies:
+        for reply in islice(replies, REPLIES_MAX):
             message = None if reply.ok is None else _message(reply.ok)
             if reply.ok is not None and message is not None:
                 number = str(reply.ok.key_expr).rpartition("/")[2]
@@ -195,7 +198,8 @@ class Monitor(Closing):
             # Otherwise one reply for each key is left.
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        messages = [_message(reply.ok) for reply in replies if reply.ok is not None]
+        first = islice(replies, REPLIES_MAX)
+        messages = [_message(reply.ok) for reply in first if reply.ok is not None]
         return [message for message in messages if message is not None]
 
     def close(self) -> None:
