@@ -198,7 +198,7 @@ def _largest_of(axes: Sequence[int]) -> Figure:
 def _rms_of(axes: Sequence[int]) -> Figure:
     def rms(record: IterationRecord) -> float | None:
         figures = record.axes_tracking_rms_m
-        if max(axes) >= len(figures):
+        if not axes or max(axes) >= len(figures):
             return None
         return float(sum(figures[axis] ** 2 for axis in axes) ** 0.5)
 

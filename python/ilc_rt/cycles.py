@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ilc_rt.misfit import AXES_MAX, CYCLES_MAX, NUMBER_MAX
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-AXES_MAX = 64
-CYCLES_MAX = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,5 +109,5 @@ def _table(batch: dict[str, Any], key: str, shape: tuple[int, int]) -> Array | N
         return None
     if table.shape != shape:
         return None
-    table[~np.isfinite(table)] = np.nan
+    table[~(np.abs(table) <= NUMBER_MAX)] = np.nan
     return table

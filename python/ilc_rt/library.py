@@ -11,11 +11,11 @@ from ilc_rt import _native
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.given import given
-from ilc_rt.retention import kept_by, selected
+from ilc_rt.retention import DESCRIPTIONS, kept_by, selected, with_descriptions
 
 if TYPE_CHECKING:
     import builtins
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import ArrayLike
     from typing_extensions import Self
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 IN_MEMORY = ":memory:"
 #: More runs than any library has.
 ALL = 2**31
+#: Runs that are deleted in one transaction: some tenths of a second.
+DELETED_AT_ONCE = 1000
 
 
 class Library(Closing, _native.Library):
@@ -143,7 +145,9 @@ class Library(Closing, _native.Library):
         Parameters
         ----------
         **wanted
-            By keys of `list`. A pair of numbers, or of texts, is a range with both ends, either
+            By keys of `list`, and by ``program`` and ``law_parameters`` of `load`, as JSON text or
+            as what it means; these two are read with the arrays of the runs that the other keys
+            leave. A pair of numbers, or of texts, is a range with both ends, either
             of which may be None; any other value is compared. Dates are compared as texts, so
             ``created_utc=("2026-11", None)`` has all runs from November 2026 on. A vector of
             disturbances is in a range if each of its elements is.
@@ -167,7 +171,8 @@ class Library(Closing, _native.Library):
         >>> library.select(cell="gantry", disturbance=(20.0, 25.0), created_utc=("2026-11", None))
         []
         """
-        return selected(self.list(), wanted)
+        described = {key: wanted.pop(key) for key in DESCRIPTIONS if key in wanted}
+        return with_descriptions(selected(self.list(), wanted), described, self._rows)
 
     def to_dataframe(self, **wanted: Any) -> Any:  # noqa: ANN401 (pandas is optional)
         """Return the runs as a table of pandas, one row per run; `wanted` as for `select`.
@@ -369,6 +374,7 @@ class Library(Closing, _native.Library):
         days: float | None = None,
         best: int | None = None,
         cell: str | None = None,
+        progress: Callable[[int, int], object] | None = None,
     ) -> int:
         """Delete all runs that no rule keeps, and return how many were deleted.
 
@@ -385,6 +391,8 @@ class Library(Closing, _native.Library):
             only measure and rolled back ones are not among them.
         cell : str or None
             Only among runs of the cell of this name.
+        progress : callable or None
+            Called with the number of deleted runs, and of all that are to be deleted.
 
         Returns
         -------
@@ -396,13 +404,21 @@ class Library(Closing, _native.Library):
         BadInputError
             If there is no rule, or one is negative or not finite.
         OSError
-            If the file cannot be written; nothing is deleted then. If only its size cannot be
-            changed, the message says that the runs are deleted.
+            If the file cannot be written. If only its size cannot be changed, the message says
+            that the runs are deleted.
+
+        Notes
+        -----
+        Oldest first, a thousand in one transaction: a campaign that stores a run meanwhile does not
+        wait for all of them. After an interruption the rest stays, and the same call goes on.
         """
         runs = self.list(cell)
         kept = kept_by(runs, newest=newest, days=days, best=best)
         gone = [run["id"] for run in runs if run["id"] not in kept]
-        self._remove(gone)
+        for first in range(0, len(gone), DELETED_AT_ONCE):
+            if progress is not None:
+                progress(first, len(gone))
+            self._remove(gone[first : first + DELETED_AT_ONCE])
         return len(gone)
 
     def export(self, id: int, path: str | PathLike[str]) -> None:

@@ -14,16 +14,17 @@ from __future__ import annotations
 import json
 import math
 import queue
+import re
 import socket
 import time
-import types
-import typing
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import SCHEMA, EventError, StartEvent, parse_event
+from ilc_rt.misfit import misfit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -38,12 +39,17 @@ _T = TypeVar("_T")
 POLL_S = 0.2
 QUEUE_MAX = 10_000
 PAYLOAD_MAX_BYTES = 1 << 20
+#: Of a question to a cell; a controller gives 1,000 events and a few states, anyone may answer.
+REPLIES_MAX = 5_000
 # Topic under which an event of the history was published.
 PAST_TOPICS = {
     "start": "state", "iteration": "iteration", "judged": "iteration", "drift": "iteration",
     "fault": "fault", "inputs": "inputs", "drives": "drives",
 }  # fmt: skip
 TEXT_MAX = 2_000
+EVERY_CELL = "*"
+#: As cell descriptions allow them.
+CELL_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +100,7 @@ class Monitor(Closing):
     Raises
     ------
     BadInputError
-        If an endpoint is invalid.
+        If an endpoint is invalid, or no cell can have this name.
     CampaignError
         If no Zenoh session can be opened.
 
@@ -113,10 +119,7 @@ class Monitor(Closing):
         scouting: bool = True,
         router: bool = False,
     ) -> None:
-        if not cell or any(sign in cell for sign in "/#?$ "):
-            message = f"cell = {cell!r}: a name without / # ? $, or * for every cell"
-            raise BadInputError(message)
-        self._cell = cell
+        self._cell = checked_name(cell)
         self._queue: queue.Queue[Message] = queue.Queue(QUEUE_MAX)
         self._lost = 0
         # Messages of the past that may still arrive once more.
@@ -171,7 +174,7 @@ class Monitor(Closing):
             consolidation=ConsolidationMode.NONE,
         )
         found: list[tuple[float, Message]] = []
-        for reply in replies:
+        for reply in islice(replies, REPLIES_MAX):
             message = None if reply.ok is None else _message(reply.ok)
             if reply.ok is not None and message is not None:
                 number = str(reply.ok.key_expr).rpartition("/")[2]
@@ -195,7 +198,8 @@ class Monitor(Closing):
             # Otherwise one reply for each key is left.
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        messages = [_message(reply.ok) for reply in replies if reply.ok is not None]
+        first = islice(replies, REPLIES_MAX)
+        messages = [_message(reply.ok) for reply in first if reply.ok is not None]
         return [message for message in messages if message is not None]
 
     def close(self) -> None:
@@ -217,6 +221,28 @@ class Monitor(Closing):
             self._queue.put_nowait(message)
         except queue.Full:
             self._lost += 1
+
+
+def checked_name(cell: str) -> str:
+    """Return a name that a cell can have, or ``*`` for every cell.
+
+    Raises
+    ------
+    BadInputError
+        If no cell can have it.
+
+    Examples
+    --------
+    >>> checked_name("press-7")
+    'press-7'
+    """
+    if cell != EVERY_CELL and CELL_NAME.fullmatch(cell) is None:
+        message = (
+            f"cell = {_clean(cell)!r}: 1 to 64 letters, digits, - and _, the TOML file of a cell, "
+            "or * for every cell"
+        )
+        raise BadInputError(message)
+    return cell
 
 
 def _open(connect: Sequence[str], *, scouting: bool, router: bool) -> zenoh.Session:
@@ -288,9 +314,9 @@ def _message(sample: zenoh.Sample) -> Message | None:
         event = parse_event(json.dumps({"event": topic, **payload}))
     except EventError as error:
         return Message(cell, topic, payload, warning=_clean(f"a message left out: {error}"))
-    misfit = None if event is None else _misfit(event)
-    if misfit is not None:
-        return Message(cell, topic, payload, warning=f"a message left out: {misfit}")
+    found = None if event is None else misfit(event)
+    if found is not None:
+        return Message(cell, topic, payload, warning=_clean(f"a message left out: {found}"))
     warning = None
     if isinstance(event, StartEvent) and event.schema > SCHEMA:
         warning = (
@@ -318,37 +344,3 @@ def _clean_all(value: object) -> object:
     if isinstance(value, list):
         return [_clean_all(item) for item in value]
     return value
-
-
-def _misfit(event: object) -> str | None:
-    """Return the name of a field of a typed object with a value of the wrong type."""
-    hints = typing.get_type_hints(type(event))
-    for field in fields(event):  # type: ignore[arg-type]
-        value = getattr(event, field.name)
-        if is_dataclass(value):
-            inner = _misfit(value)
-            if inner is not None:
-                return f"{field.name}: {inner}"
-        elif not _fits(value, hints[field.name]):
-            return f"{field.name} = {str(value)[:80]} is not of its type"
-    return None
-
-
-def _fits(value: object, hint: object) -> bool:
-    """Return whether a value has the annotated type; numbers must be finite."""
-    origin = typing.get_origin(hint)
-    if origin in {typing.Union, types.UnionType}:
-        return any(_fits(value, one) for one in typing.get_args(hint))
-    if origin is tuple:
-        kinds = typing.get_args(hint)
-        if not isinstance(value, tuple):
-            return False
-        if len(kinds) == 2 and kinds[1] is Ellipsis:
-            return all(_fits(item, kinds[0]) for item in value)
-        return len(value) == len(kinds) and all(map(_fits, value, kinds))
-    if hint in {int, float}:
-        allowed = int if hint is int else (int, float)
-        if isinstance(value, bool) or not isinstance(value, allowed):
-            return False
-        return abs(value) < 1e300 if isinstance(value, int) else math.isfinite(value)
-    return isinstance(hint, type) and isinstance(value, hint)

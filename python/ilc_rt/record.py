@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt.errors import BadInputError
 from ilc_rt.figures import Figures
-from ilc_rt.library import Library
+from ilc_rt.read_only import ReadOnlyLibrary
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -125,10 +124,10 @@ class IterationRecord(Figures):
             If the library or its run does not exist any more.
         """
         if not self._loaded:
-            if not Path(self.library).is_file():
-                message = f"{self.library}: no such library"
-                raise BadInputError(message)
-            self._loaded.update(Library(self.library).load(self.id))
+            try:
+                self._loaded.update(ReadOnlyLibrary(self.library).load(self.id))
+            except FileNotFoundError as error:
+                raise BadInputError(str(error)) from error
         return self._loaded
 
     def _optional(self, name: str) -> NDArray[np.float64] | None:

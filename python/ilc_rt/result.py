@@ -20,7 +20,6 @@ from ilc_rt.events import (
     LatencyEvent,
     StartEvent,
 )
-from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, digits
 from ilc_rt.read_only import ReadOnlyLibrary
 from ilc_rt.record import IterationRecord
@@ -245,7 +244,8 @@ class CampaignResult(Views):
     def _recall_earlier_runs(self, first_index: int) -> None:
         if not Path(self.library).is_file():
             return
-        own = [row for row in Library(self.library).list() if row["campaign"] == self.campaign]
+        stored = ReadOnlyLibrary(self.library).list()
+        own = [row for row in stored if row["campaign"] == self.campaign]
         own.sort(key=lambda row: int(row["index"]))
         self.records.extend(
             IterationRecord.from_row(row, self.library)

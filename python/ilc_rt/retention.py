@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from datetime import datetime, timedelta, timezone
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,12 @@ from typing import TYPE_CHECKING, Any
 from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
+
+#: Entries of a run that are not in a list: they are long, and the same for many runs.
+DESCRIPTIONS = ("program", "law_parameters")
+#: Runs that are read with their arrays at once.
+READ_AT_ONCE = 100
 
 
 def kept_by(
@@ -80,6 +86,40 @@ def selected(runs: Sequence[Mapping[str, Any]], wanted: Mapping[str, Any]) -> li
         message = f"{unknown[0]}: a run has {', '.join(runs[0])}"
         raise BadInputError(message)
     return [dict(run) for run in runs if all(_is(run[key], value) for key, value in wanted.items())]
+
+
+def with_descriptions(
+    runs: list[dict[str, Any]],
+    wanted: Mapping[str, object],
+    read: Callable[[list[int]], Sequence[Mapping[str, Any]]],
+) -> list[dict[str, Any]]:
+    """Return the runs that have wanted `DESCRIPTIONS`, as JSON text or as what it means.
+
+    `read` returns the rows of some keys, with their arrays.
+    """
+    if not wanted:
+        return runs
+    meant = {key: _parsed(value) for key, value in wanted.items()}
+    found: list[dict[str, Any]] = []
+    for first in range(0, len(runs), READ_AT_ONCE):
+        part = runs[first : first + READ_AT_ONCE]
+        rows = read([int(run["id"]) for run in part])
+        found += [
+            run
+            for run, row in zip(part, rows, strict=True)
+            if all(_parsed(row[key]) == value for key, value in meant.items())
+        ]
+    return found
+
+
+def _parsed(text: object) -> object:
+    """Return what a JSON text means; anything else, and a text that is not JSON, as it is."""
+    if not isinstance(text, str):
+        return text
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
 
 
 def _is(value: Any, wanted: Any) -> bool:  # noqa: ANN401 (any value of a run)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.fleet.database import SQLITE, file_of, is_database, shown
-from ilc_rt.library import Library
+from ilc_rt.read_only import ReadOnlyLibrary
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -46,6 +46,9 @@ class Source(Protocol):
 
     def stamp(self) -> object:
         """Return a mark that changes whenever the runs do; None before the first run."""
+
+    def check(self) -> None:
+        """Raise `BadInputError` if it cannot be read."""
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the runs as `Library.list` does."""
@@ -125,6 +128,22 @@ class Memory(Closing):
                 rows += one.rows() if one.stamp() is not None else []
         return campaign_of(rows, cell, campaign, digest)
 
+    def missing(self) -> list[str]:
+        """Return the names of the files that do not exist yet.
+
+        Raises
+        ------
+        BadInputError
+            If a file is not a library, or a database cannot be read.
+        """
+        names = []
+        for one in self._sources:
+            if one.stamp() is None:
+                names.append(one.name)
+            else:
+                one.check()
+        return names
+
     def close(self) -> None:
         """Close the connections to databases."""
         for one in self._sources:
@@ -150,6 +169,19 @@ class FileSource:
         stamps = [_file_stamp(file) for file in (self._file, Path(f"{self._file}-wal"))]
         return None if stamps[0] is None else tuple(stamps)
 
+    def check(self) -> None:
+        """Look whether it is a library, or an empty file.
+
+        Raises
+        ------
+        BadInputError
+            If it is something else.
+        """
+        try:
+            self._opened()
+        except OSError as error:
+            raise BadInputError(str(error)) from error
+
     def rows(self) -> list[dict[str, Any]]:
         """Return its runs, oldest first.
 
@@ -159,7 +191,8 @@ class FileSource:
             If it is no library.
         """
         try:
-            return Library(self._file).list()
+            library = self._opened()
+            return [] if library is None else library.list()
         except OSError as error:
             raise BadInputError(str(error)) from error
 
@@ -172,12 +205,23 @@ class FileSource:
             If there is no such run, or it is damaged.
         """
         try:
-            return Library(self._file).load(run)
+            return ReadOnlyLibrary(self._file).load(run)
         except OSError as error:
             raise BadInputError(str(error)) from error
 
     def close(self) -> None:
         """Leave the file: no call holds it open."""
+
+    def _opened(self) -> ReadOnlyLibrary | None:
+        """Return the library; None if the file has gone, or is empty: it has no runs yet."""
+        try:
+            if self._file.is_file() and not self._file.stat().st_size:
+                return None
+            library = ReadOnlyLibrary(self._file)
+            len(library)
+        except FileNotFoundError:
+            return None
+        return library
 
 
 class FleetSource:
@@ -207,6 +251,16 @@ class FleetSource:
             If the database cannot be read.
         """
         return self._asked(lambda library: library.stamp())
+
+    def check(self) -> None:
+        """Look whether the database can be read.
+
+        Raises
+        ------
+        BadInputError
+            If it cannot.
+        """
+        self.stamp()
 
     def rows(self) -> list[dict[str, Any]]:
         """Return its newest runs, at most `RUNS_MAX`, in the order of their arrival.

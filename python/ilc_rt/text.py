@@ -36,6 +36,17 @@ def printable_lines(text: str) -> str:
     return "\n".join("".join(map(_seen, line)) for line in text.split("\n"))
 
 
+def runs_counted(number: int) -> str:
+    """Return a number of runs in words.
+
+    Examples
+    --------
+    >>> runs_counted(1), runs_counted(0)
+    ('1 run', '0 runs')
+    """
+    return f"{number} run{'' if number == 1 else 's'}"
+
+
 def label(name: object) -> str:
     r"""Return a name for a figure, in which a dollar sign does not start a formula.
 

@@ -28,6 +28,7 @@ from ilc_rt.events import (
     StateEvent,
 )
 from ilc_rt.lateness import late_sentence
+from ilc_rt.misfit import AXES_MAX
 from ilc_rt.quantity import axis_unit
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import UNTIL_STOPPED
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
 #: What is kept of a cell at most: of runs, of notes.
 RUNS_MAX = 5000
 NOTES_MAX = 100
-AXES_MAX = 64
 NAME_MAX = 40
 #: Elapsed time from which the time left can be told.
 TOLD_AFTER_S = 1.0

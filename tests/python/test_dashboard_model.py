@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from watched_fixture import STAGES, START, batch, ended, fed, said
 
-from ilc_rt import BadInputError, Library
+from ilc_rt import BadInputError, CampaignResult, Library
 from ilc_rt.dashboard import charts
 from ilc_rt.dashboard.archive import Archive, distance, relevance
 from ilc_rt.dashboard.capture import Capture
@@ -21,11 +24,6 @@ from ilc_rt.dashboard.notes import NOTE_MAX, notes_file, read_notes, write_note
 from ilc_rt.dashboard.status import SILENT_S, SYMBOLS, axis_words, run_words
 from ilc_rt.dashboard.window import Window
 from ilc_rt.monitor import Message
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from ilc_rt import CampaignResult
 
 
 def test_a_peak_of_one_cycle_survives_thinning() -> None:
@@ -288,6 +286,35 @@ def test_relevance_falls_with_error_and_distance() -> None:
     assert relevance([], {}) == []
 
 
+def test_a_run_without_a_finite_error_takes_no_share_of_the_others() -> None:
+    """As another program may have written it."""
+    good = {"tracking_rms_m": 1e-4, "disturbance": [20.0]}
+    odd = [good | {"tracking_rms_m": error} for error in (float("nan"), 1e300, None)]
+    assert relevance([good, *odd, good], good) == [0.5, 0.0, 0.0, 0.0, 0.5]
+    assert relevance(odd, good) == [0.0, 0.0, 0.0]
+
+
+def test_who_watches_makes_and_changes_no_library(tmp_path: Path, finished: CampaignResult) -> None:
+    """An empty file stays empty; one that is deleted between two looks is not made again."""
+    empty, gone = tmp_path / "empty.db", tmp_path / "gone.db"
+    empty.touch()
+    gone.write_bytes(Path(finished.library).read_bytes())
+    (record, *_) = CampaignResult.from_library(gone).records
+    archive = Archive([empty, gone])
+    assert len(archive.rows()) == 3
+    archive.sources[0].check()
+    with pytest.raises(BadInputError, match="an empty file"):
+        archive.sources[0].load(1)
+    gone.unlink()
+    # As if it had been deleted just after its stamp was looked at.
+    assert archive.sources[1].rows() == []
+    for load in (lambda: archive.sources[1].load(1), record.row):
+        with pytest.raises(BadInputError, match=r"gone\.db: no such library"):
+            load()
+    assert [path.name for path in tmp_path.iterdir()] == ["empty.db"]
+    assert empty.stat().st_size == 0
+
+
 def test_notes_are_kept_beside_the_library(tmp_path: Path) -> None:
     library = tmp_path / "l.db"
     assert read_notes(library) == {}
@@ -305,6 +332,26 @@ def test_notes_are_kept_beside_the_library(tmp_path: Path) -> None:
     with pytest.raises(BadInputError):
         write_note(library, "c1/3", "not lost")
     assert notes_file(library).read_text() == "[1]"
+
+
+def test_dashboards_beside_each_other_lose_no_note(tmp_path: Path) -> None:
+    """Two processes that write at the same time, each notes of its own."""
+    code = (
+        "import sys; from pathlib import Path; from ilc_rt.dashboard.notes import write_note\n"
+        "sys.stdin.read(1)\n"
+        "for number in range(40): write_note(Path('l.db'), f'{sys.argv[1]}/{number}', 'seen')"
+    )
+    writers = [
+        subprocess.Popen([sys.executable, "-c", code, name], cwd=tmp_path, stdin=subprocess.PIPE)
+        for name in ("a", "b")
+    ]
+    for writer in writers:
+        assert writer.stdin is not None
+        writer.stdin.write(b"!")
+        writer.stdin.close()
+    assert [writer.wait(60.0) for writer in writers] == [0, 0]
+    assert len(read_notes(tmp_path / "l.db")) == 80
+    assert [path.name for path in tmp_path.iterdir()] == ["l.db.notes.json"]
 
 
 def test_a_flight_record_beside_the_library_tells_who_was_late(tmp_path: Path) -> None:

@@ -144,6 +144,9 @@ def test_numbers_change_while_the_cell_runs_and_it_comes_back(watched: Watched) 
     wait_for(page, "ilc.option('runs').series[0]?.data.length > 1")
     controller.signal(signal.SIGKILL)
     wait(page, "state", "silent since")
+    # Without the seconds, of which a screen reader would tell every one.
+    spoken = page.locator('[role="status"][data-name="spoken"]')
+    sync_api.expect(spoken).to_have_text("silent")
     controller.close()
     # The same page follows the next campaign to its end; the drives noticed the loss of the last.
     controller = watched.run(6, "--reset-faults")

@@ -293,7 +293,7 @@ def with_database(text: str, folder: Path, postgres: Server) -> None:
     second = cell.replace('name = "gantry"', 'name = "gantry-2"', 1)
     (folder / "gantry-2.toml").write_text(second, encoding="utf-8")
     said = run(re.sub(r"postgresql://\S+", lambda _: f"'{address}'", text), folder)
-    wanted = r"dashboard: http" if "dashboard" in text else r"\d( of \d+)? runs .*stored"
+    wanted = r"dashboard: http" if "dashboard" in text else r"\d( of \d+)? runs? .*stored"
     assert re.search(wanted, said)
 
 

@@ -102,6 +102,35 @@ def _publish(cell: Any, known: threading.Event, all_events: list[Any]) -> None:
         cell.put(f"ilc/gantry/{topic}", json.dumps(event))
 
 
+def test_an_event_that_the_database_refuses_holds_nobody_up(
+    address: str, finished: CampaignResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a stranger may publish it; the runs after it are stored."""
+    from ilc_rt.events import parse_event
+    from ilc_rt.monitor import Message
+
+    def said(event: dict[str, Any], cell: str = "hall-3") -> Message:
+        return Message(cell, "", event, parse_event(json.dumps(event)))
+
+    (_, start), (_, run), *_ = events(str(finished.library))
+    monkeypatch.setattr("ilc_rt.fleet.collect.CELLS_MAX", 3)
+    with Collector(address) as collector:
+        collector.take(said(start))
+        for odd, why in (
+            (run | {"index": -1}, "run -1 of hall-3: new row"),
+            (run | {"index": 2**40}, "run 1099511627776 of hall-3: integer out of range"),
+            (run | {"digest": None}, "run 0 of hall-3: null value"),
+        ):
+            collector.take(said(odd))
+            assert str(collector.refused).startswith(why)
+            assert (collector.stored, collector.n_waiting) == (0, 0)
+        collector.take(said(run))
+        assert collector.stored == 1
+        for number in range(10):
+            collector.take(said(run, f"stranger-{number}"))
+        assert len(collector.unknown) == 2
+
+
 def test_a_lost_connection_is_opened_again(address: str, finished: CampaignResult) -> None:
     from ilc_rt.events import parse_event
     from ilc_rt.monitor import Message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,6 @@ from ilc_rt.retention import kept_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from ilc_rt import CampaignResult
 
@@ -52,8 +52,29 @@ def test_the_list_of_the_command_line_has_pages(ilc: Callable[..., object], libr
     rows = [line.split() for line in listed.stdout.splitlines() if "-1 " in line]
     assert [row[0] for row in rows] == ["3", "4", "5"]
     assert f"3 of 12 runs in {library.path}" in listed.stdout
-    refused = ilc("library", "list", library.path, "--offset", 2)
-    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+    for wrong in (["--offset", 2], ["--json", "-", "--csv", "-"]):
+        refused = ilc("library", "list", library.path, *wrong)
+        assert (refused.returncode, len(refused.stderr.splitlines()), refused.stdout) == (2, 1, "")
+    # A mistyped name is seen.
+    listed = ilc("library", "list", library.path, "--cell", "pres")
+    assert f"0 of 12 runs in {library.path}" in listed.stdout
+
+
+def test_a_run_is_shown_without_a_list_of_all(
+    ilc: Callable[..., object], library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ilc_rt.commands.library import _load
+
+    assert [run["id"] for run in library.page(limit=1, offset=6)] == [7]
+    with sqlite3.connect(library.path) as writer:
+        writer.execute("UPDATE signals SET input = zeroblob(8) WHERE id = 3")
+    writer.close()
+    for run, told in ((3, "digest"), (99, "no run 99; there are 1 to 12"), (-1, "1 to 12")):
+        refused = ilc("library", "show", library.path, "--", run)
+        assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+        assert told in refused.stderr
+    monkeypatch.setattr(ReadOnlyLibrary, "page", None)
+    assert _load(Path(library.path), 7)["id"] == 7
 
 
 def test_wide_letters_keep_the_columns(ilc: Callable[..., object], tmp_path: Path) -> None:
@@ -109,6 +130,24 @@ def test_rules_keep_the_newest_and_the_best(library: Library) -> None:
         library.retain()
     with pytest.raises(BadInputError, match=r"days = -1: a number of 0 or more"):
         library.retain(days=-1)
+
+
+def test_runs_are_deleted_in_batches_that_are_told(
+    library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No writer waits for all of them; oldest first, so that the rest is a library, too."""
+    monkeypatch.setattr("ilc_rt.library.DELETED_AT_ONCE", 4)
+    told: list[tuple[int, int]] = []
+    left: list[list[int]] = []
+
+    def tell(done: int, total: int) -> None:
+        told.append((done, total))
+        left.append([run["id"] for run in library])
+
+    assert library.retain(newest=2, progress=tell) == 10
+    assert told == [(0, 10), (4, 10), (8, 10)]
+    assert left == [list(range(1, 13)), list(range(5, 13)), list(range(9, 13))]
+    assert [run["id"] for run in library] == [11, 12]
 
 
 def test_age_counts_from_now_and_the_newest_run_of_a_campaign_stays() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,6 +51,23 @@ def test_runs_are_selected_by_value_and_range(library: Library) -> None:
     created = library.list()[0]["created_utc"]
     assert ids(created_utc=(created[:4], None)) == list(range(1, 9))
     assert ids(created_utc=(None, "2001")) == []
+
+
+def test_runs_are_selected_by_program_and_parameters_of_the_law(
+    finished: CampaignResult, library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As text, or as what it means; over several batches."""
+    monkeypatch.setattr("ilc_rt.retention.READ_AT_ONCE", 2)
+    real = Library(finished.library)
+    run = real.load(2)
+    program, law = json.loads(run["program"]), json.loads(run["law_parameters"])
+    assert real.select(program=run["program"], law_parameters=law) == real.list()
+    assert real.select(program=dict(reversed(program.items())), index=1) == real.list()[1:2]
+    assert real.select(program=program | {"dwell_after_s": 9.0}) == []
+    assert real.select(law_parameters=law | {"rate": -1.0}) == []
+    elsewhere = library.load(1)["program"]
+    assert library.select(program=elsewhere, cell="press") == library.select(cell="press")
+    assert library.select(program=program) == []
 
 
 def test_a_run_without_a_value_is_in_no_range(library: Library) -> None:

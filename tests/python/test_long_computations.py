@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,6 +77,24 @@ def test_a_terminal_has_one_line_that_disappears() -> None:
     length = len(told.file.getvalue())
     told.steps.close()
     assert len(told.file.getvalue()) == length
+
+
+def test_what_cannot_tell_its_steps_tells_its_time() -> None:
+    """One native call, watched from a thread; nothing is left of its line."""
+    told = Told(terminal=True)
+    told.now_s = TOLD_AFTER_S + 1.0
+    with told.steps.clocked("weighing"):
+        for _ in range(6000):
+            if told.file.getvalue():
+                break
+            time.sleep(0.01)
+    assert told.file.getvalue() == f"{START_OF_LINE}weighing, 0:03 so far{START_OF_LINE}"
+    plain = Told(terminal=False)
+    plain.steps.tell_time("weighing")
+    plain.now_s = 70.0
+    plain.steps.tell_time("weighing")
+    plain.steps.tell_time("weighing")
+    assert plain.file.getvalue() == "  weighing, 1:10 so far\n"
 
 
 def test_every_long_computation_tells_its_steps(
@@ -219,20 +238,33 @@ def test_ctrl_c_in_plot_keeps_the_former_pictures(
     assert [path.read_bytes() for path in files] == before
 
 
-def test_ctrl_c_in_trim_deletes_all_or_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("at", "left"), [(1, 60), (3, 40)])
+def test_ctrl_c_in_trim_deletes_whole_batches_and_the_next_one_goes_on(
+    at: int, left: int, tmp_path: Path
+) -> None:
     path = filled(tmp_path / "l.db", 60)
     before, size = content(path), path.stat().st_size
     words = ["library", "trim", path, "--newest", "10"]
-    process = ilc(tmp_path, *words, before=slow("ilc_rt.library", "kept_by"))
+    batches = "import ilc_rt.library\nilc_rt.library.DELETED_AT_ONCE = 10\n"
+    process = ilc(tmp_path, *words, before=batches + slow("ilc_rt.library", "Library._remove", at))
     process.line_with("waiting")
-    assert interrupt(process) == []
-    assert content(path) == before
+    assert interrupt(process) == [f"ilc: stopped; {60 - left} runs are deleted, {left} are there"]
+    assert content(path) == before[-left:]
     again = ilc(tmp_path, *words)
     assert again.end() == 0, again.errors
     again.close()
-    assert again.said == [f"50 runs deleted from {path}"]
+    assert again.said == [f"{left - 10} runs deleted from {path}"]
     assert content(path) == before[-10:]
     assert path.stat().st_size < size
+
+
+def test_ctrl_c_in_a_trim_by_relevance_tells_what_is_left(tmp_path: Path) -> None:
+    path = filled(tmp_path / "l.db", 20)
+    words = ["library", "trim", path, "5"]
+    process = ilc(tmp_path, *words, before=slow("ilc_rt.library", "Library.trim"))
+    process.line_with("waiting")
+    assert interrupt(process) == ["ilc: stopped; 0 runs are deleted, 20 are there"]
+    assert len(ReadOnlyLibrary(path)) == 20
 
 
 def test_ctrl_c_in_sync_keeps_whole_batches_and_the_next_one_goes_on(

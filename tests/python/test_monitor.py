@@ -116,6 +116,17 @@ def test_a_late_joiner_hears_what_it_has_missed_once(publisher: Publisher) -> No
         assert (seen.payload["index"], seen.is_past) == (12, False)
 
 
+def test_answers_without_end_are_cut(publisher: Publisher, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Anyone may answer a question for the past."""
+    publisher.history = [STATE, *(iteration(index, 1e-3) for index in range(300))]
+    with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
+        # Its own question for the past comes first.
+        assert next(monitor.messages(30.0)).topic == "alive"
+        assert len(monitor.ask_history()) == 300
+        monkeypatch.setattr("ilc_rt.monitor.REPLIES_MAX", 100)
+        assert len(monitor.ask_history()) == 100
+
+
 def test_every_answer_of_a_controller_is_heard() -> None:
     """Also the start of a campaign before its state, should a controller answer with both."""
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"

@@ -154,6 +154,6 @@ def test_a_collector_hears_through_a_router_and_keeps_what_it_stored(
             assert process.end() == 130, process.errors
         finally:
             process.close()
-    assert "1 runs stored" in process.said
+    assert "1 run stored" in process.said
     assert json.loads(file.read_text()) == {"stored": 1}
     assert not any("Traceback" in line for line in process.errors)

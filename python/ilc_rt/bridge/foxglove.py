@@ -11,10 +11,12 @@ import json
 import time
 from typing import TYPE_CHECKING, Any
 
+from ilc_rt.addresses import reached, unusable
 from ilc_rt.bridge.signals import Cells
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import EndEvent, FaultEvent, IterationEvent, StartEvent, StateEvent
+from ilc_rt.misfit import is_number
 from ilc_rt.wording import WORDS, describe
 
 if TYPE_CHECKING:
@@ -67,8 +69,10 @@ class Foxglove(Closing):
                 name="ilc-rt", host=host, port=port, context=self._context
             )
         except RuntimeError as error:
-            message = f"{host}:{port}: {error}"
-            raise BadInputError(message) from error
+            # As "FoxgloveError: Failed to bind port: Address already in use (os error 98)".
+            reason = str(error).rpartition(": ")[2].partition(" (os error")[0]
+            raise BadInputError(unusable(host, port, reason)) from error
+        self._host = host
         self._channels: dict[str, foxglove.Channel] = {}
         self._cells = Cells(described, recall)
 
@@ -79,7 +83,7 @@ class Foxglove(Closing):
     @property
     def address(self) -> str:
         """Address to type in Foxglove, as ``ws://127.0.0.1:8765``."""
-        return f"ws://127.0.0.1:{self._server.port}"
+        return f"ws://{reached(self._host, self._server.port)}"
 
     def show(self, message: Message) -> None:
         """Send on what a message has."""
@@ -89,11 +93,7 @@ class Foxglove(Closing):
                 self._log(f"/{message.cell}/{axis}", {**run, **signals}, row.time_s)
         event = message.event
         if isinstance(event, IterationEvent):
-            figures = {
-                key: value
-                for key, value in message.payload.items()
-                if isinstance(value, (int, float)) and not isinstance(value, bool)
-            }
+            figures = {key: value for key, value in message.payload.items() if is_number(value)}
             self._log(f"/{message.cell}/iteration", figures, time.time())
         words = _words(event)
         if words is not None:

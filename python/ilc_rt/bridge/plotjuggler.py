@@ -17,6 +17,7 @@ from ilc_rt.bridge.signals import Cells
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.events import IterationEvent
+from ilc_rt.misfit import is_number
 
 if TYPE_CHECKING:
     from ilc_rt import Cell
@@ -75,11 +76,7 @@ class PlotJuggler(Closing):
             self._send(row.time_s, {message.cell: {**run, **row.axes}})
             n_sent += 1
         if isinstance(message.event, IterationEvent):
-            figures = {
-                key: value
-                for key, value in message.payload.items()
-                if isinstance(value, (int, float)) and not isinstance(value, bool)
-            }
+            figures = {key: value for key, value in message.payload.items() if is_number(value)}
             self._send(time.time(), {message.cell: {"iteration": figures}})
             n_sent += 1
         return n_sent

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt.events import StartEvent
+from ilc_rt.misfit import AXES_MAX, CYCLES_MAX, is_number
 from ilc_rt.quantity import axis_unit
 from ilc_rt.text import printable
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 BATCH_S = 0.05
 #: Difference between two clocks that is not delay of the network.
 JUMP_S = 1.0
+#: Any program on the network can publish under any name.
+CELLS_MAX = 200
 POSITIONS = {"reference_m": "reference", "encoder_m": "encoder", "tool_m": "tool"}
 
 
@@ -100,7 +103,9 @@ class Signals:
 
     def _batch(self, batch: dict[str, Any]) -> Iterator[Row]:
         first, places = batch.get("first_sync"), batch.get("iteration_and_sample")
-        if not isinstance(first, int) or not isinstance(places, list) or not places:
+        if not is_number(first) or not isinstance(first, int) or first < 0:
+            return
+        if not isinstance(places, list) or not 0 < len(places) <= CYCLES_MAX:
             return
         cycle_s = self._cycle_s or BATCH_S / len(places)
         # A batch is sent when its last cycle is over.
@@ -109,7 +114,8 @@ class Signals:
             self._zero_s = zero_s
         self._next = first + len(places)
         for index, place in enumerate(places):
-            iteration = place[0] if isinstance(place, list) and place else None
+            run = place[0] if isinstance(place, list) and place else None
+            iteration = run if is_number(run) and isinstance(run, int) else None
             time_s = self._zero_s + (first + index) * cycle_s
             yield Row(time_s, iteration, self._axes(batch, index))
 
@@ -117,7 +123,7 @@ class Signals:
         axes: dict[str, dict[str, float]] = {}
         for key, name in {**POSITIONS, "input": "input"}.items():
             for axis, value in enumerate(_row(batch.get(key), index)):
-                if isinstance(value, (int, float)) and not isinstance(value, bool):
+                if is_number(value):
                     unit = "" if key == "input" else f"_{self._unit(axis)}"
                     axes.setdefault(self._name(axis), {})[f"{name}{unit}"] = float(value)
         for axis, (name, signals) in enumerate(axes.items()):
@@ -138,7 +144,7 @@ class Signals:
 def _row(rows: object, index: int) -> list[object]:
     """Return one row of a published table; empty if it has none."""
     if isinstance(rows, list) and index < len(rows) and isinstance(rows[index], list):
-        return list(rows[index])
+        return list(rows[index][:AXES_MAX])
     return []
 
 
@@ -166,6 +172,8 @@ class Cells:
     def rows(self, message: Message) -> Iterator[Row]:
         """Yield the servo cycles of a message."""
         if message.cell not in self._signals:
+            if len(self._signals) >= CELLS_MAX:
+                return iter(())
             runs = [] if self._recall is None else self._recall(message.cell)
             self._signals[message.cell] = Signals.of_run(runs[-1]) if runs else Signals()
         return self._signals[message.cell].rows(message)

@@ -18,10 +18,12 @@ from ilc_rt.commands.network import (
     Timeout,
     described,
     listen,
+    remembering,
+    tell_others,
     whom,
 )
+from ilc_rt.commands.targets import check_file
 from ilc_rt.errors import BadInputError
-from ilc_rt.sources import Memory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,9 +35,21 @@ app = typer.Typer(
     no_args_is_help=True, help="Show a running controller in PlotJuggler or Foxglove."
 )
 
+
+def _layout_target(context: typer.Context, path: Path | None) -> Path | None:
+    """Check the file of the layout before anything is opened."""
+    if path is not None and not context.resilient_parsing:
+        check_file("--layout", path)
+    return path
+
+
 Layout = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Write a layout for the cell, given as its TOML file."),
+    typer.Option(
+        metavar="FILE",
+        callback=_layout_target,
+        help="Write a layout for the cell, given as its TOML file.",
+    ),
 ]
 
 
@@ -62,7 +76,7 @@ def plotjuggler(
     _write(layout, known, plotjuggler_bridge.layout)
     host, port = _address(to)
     with (
-        Memory(library or ()) as memory,
+        remembering(library) as memory,
         plotjuggler_bridge.PlotJuggler(host, port, known, memory.campaign) as bridge,
         listen(name, connect, scouting=scouting, router=router) as watching,
     ):
@@ -94,10 +108,11 @@ def foxglove(
     name, known = described(cell)
     _write(layout, known, foxglove_bridge.layout)
     with (
-        Memory(library or ()) as memory,
+        remembering(library) as memory,
         foxglove_bridge.Foxglove(host, port, known, memory.campaign) as bridge,
         listen(name, connect, scouting=scouting, router=router) as watching,
     ):
+        tell_others(host)
         _follow(name, bridge.address, bridge.show, watching, timeout)
 
 

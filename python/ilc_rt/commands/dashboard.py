@@ -6,9 +6,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ilc_rt.commands.network import Connect, Libraries, Router, Scouting, Timeout, described
+from ilc_rt.addresses import reached
+from ilc_rt.commands.network import (
+    Connect,
+    Libraries,
+    Router,
+    Scouting,
+    Timeout,
+    described,
+    tell_missing,
+    tell_others,
+)
 from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
+from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
+from ilc_rt.monitor import EVERY_CELL
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -44,20 +56,21 @@ def dashboard(
     from ilc_rt.dashboard.fleet import Fleet
 
     server = _server()
-    known = [described(cell) for cell in cells or () if cell != "*"]
+    known = [described(cell) for cell in cells or () if cell != EVERY_CELL]
     fleet = Fleet(dict.fromkeys(name for name, _ in known))
     for name, cell in known:
         if cell is not None:
             fleet.cells[name].describe(cell)
+    with Steps("libraries").clocked("reading the libraries"):
+        opened = Archive(_libraries(library))
     with (
-        Archive(_libraries(library)) as archive,
+        opened as archive,
         server.listen(host, port) as listener,
         Feed(fleet, archive, connect or (), scouting=scouting, router=router),
     ):
-        shown = f"[{host}]" if ":" in host else host
-        typer.echo(f"dashboard: http://{shown}:{listener.getsockname()[1]}")
-        if not server.is_local(host):
-            typer.echo("anyone on that network can watch; nobody can command", err=True)
+        tell_missing(one.name for one in archive.sources if one.stamp() is None)
+        typer.echo(f"dashboard: http://{reached(host, listener.getsockname()[1])}")
+        tell_others(host)
         typer.echo("Ctrl-C ends this, not the machine", err=True)
         server.serve(fleet, archive, listener, host, timeout)
 

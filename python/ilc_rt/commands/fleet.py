@@ -12,7 +12,7 @@ from ilc_rt.commands.options import JsonFile  # noqa: TC001 - typer reads it
 from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import json_text, write_text
-from ilc_rt.text import printable
+from ilc_rt.text import printable, runs_counted
 
 FROM = "Library file (sqlite:///cell.db, or its path), or database (postgresql://USER@HOST/NAME)."
 Source = Annotated[str, typer.Argument(metavar="FROM", help=FROM)]
@@ -68,7 +68,10 @@ def sync(
     if json_file is not None:
         counts = {"stored": done.stored, "renewed": done.renewed, "present": done.present}
         write_text(json_file, json_text({**counts, "damaged": list(done.damaged)}))
-    typer.echo(f"{done.stored} runs stored, {done.renewed} renewed, {done.present} were there")
+    was = "was" if done.present == 1 else "were"
+    typer.echo(
+        f"{runs_counted(done.stored)} stored, {done.renewed} renewed, {done.present} {was} there"
+    )
     if done.damaged:
         ids = ", ".join(map(str, done.damaged))
         message = f"{source}: runs left out, as their arrays do not match their digest: {ids}"
@@ -96,7 +99,7 @@ def collect(
     ):
         typer.echo("collecting; Ctrl-C ends this, not the machines", err=True)
         warned: set[str] = set()
-        was_waiting = False
+        was_waiting, was_refused = False, None
         try:
             for message in seen.messages(timeout):
                 collector.take(message)
@@ -106,12 +109,15 @@ def collect(
                         f"{printable(name)}: its campaign began before; sync brings its runs",
                         err=True,
                     )
+                if collector.refused != was_refused:
+                    was_refused = collector.refused
+                    typer.echo(f"left out: {printable(was_refused)}", err=True)
                 if bool(collector.n_waiting) != was_waiting:
                     was_waiting = not was_waiting
                     state = "cannot be reached: runs wait" if was_waiting else "is there again"
                     typer.echo(f"the database {state}", err=True)
         finally:
-            typer.echo(f"{collector.stored} runs stored")
+            typer.echo(f"{runs_counted(collector.stored)} stored")
             if json_file is not None:
                 write_text(json_file, json_text({"stored": collector.stored}))
 
@@ -141,8 +147,8 @@ def fetch(
         write_text(json_file, json_text({name: getattr(got, name) for name in told}))
     error = unit_for("m", got.best_tracking_rms_m).text(got.best_tracking_rms_m)
     typer.echo(
-        f"{got.stored} of {got.runs} runs of {printable(got.from_cell)} stored as campaign "
-        f"{printable(got.campaign)}; smallest RMS error {error}\n"
+        f"{got.stored} of {runs_counted(got.runs)} of {printable(got.from_cell)} stored as "
+        f"campaign {printable(got.campaign)}; smallest RMS error {error}\n"
         f"go on: ilc run {printable(cell)} --library {printable(into)} --resume "
         f"--iterations {got.runs + 5}"
     )

@@ -20,11 +20,12 @@ from ilc_rt.commands.options import (
     JsonFile,
     LibraryArgument,
 )
+from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, unit_for
 from ilc_rt.result import STANDARD_OUTPUT, existing, json_text, write_text
-from ilc_rt.text import printable
+from ilc_rt.text import printable, runs_counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -112,19 +113,23 @@ def list_runs(
     if offset and limit is None:
         message = f"--offset {offset}: needs --limit, the number of runs to list"
         raise BadInputError(message)
+    if json_file == csv_file == STANDARD_OUTPUT:
+        message = "--json - --csv -: one of them on standard output"
+        raise BadInputError(message)
     total = len(existing(library))
-    rows = _rows(library, cell, campaign, limit, offset)
-    if json_file is not None:
-        write_text(json_file, json_text(rows))
-    if csv_file is not None:
-        write_text(csv_file, _csv(rows))
-    if STANDARD_OUTPUT in {json_file, csv_file}:
+    with Steps("runs").clocked(f"reading {total} runs"):
+        rows = _rows(library, cell, campaign, limit, offset)
+        files = {json_file: json_text, csv_file: _csv}
+        texts = {file: text(rows) for file, text in files.items() if file is not None}
+    for file, text in texts.items():
+        write_text(file, text)
+    if STANDARD_OUTPUT in texts:
         return
     console = Console(highlight=False, markup=False, emoji=False)
     width = console.width if console.is_terminal or "COLUMNS" in os.environ else WIDE
     typer.echo("\n".join(["", *_lines(rows, width), ""]))
-    part = "" if limit is None else f" of {total}"
-    typer.echo(f"{len(rows)}{part} run{'' if len(rows) == 1 else 's'} in {library}")
+    part = "" if len(rows) == total else f"{len(rows)} of "
+    typer.echo(f"{part}{runs_counted(total)} in {printable(library)}")
 
 
 def _rows(
@@ -258,15 +263,23 @@ def trim(
         raise BadInputError(message)
     n_runs = len(existing(library))
     try:
-        if keep is not None:
-            deleted = Library(str(library)).trim(min(keep, n_runs), cell)
-        else:
-            deleted = Library(str(library)).retain(newest=newest, days=days, best=best, cell=cell)
+        with Steps("runs deleted") as steps:
+            if keep is not None:
+                with steps.clocked(f"weighing {n_runs} runs and deleting the least relevant"):
+                    deleted = Library(str(library)).trim(min(keep, n_runs), cell)
+            else:
+                deleted = Library(str(library)).retain(
+                    newest=newest, days=days, best=best, cell=cell, progress=steps.tell
+                )
     except OSError as error:
         raise BadInputError(str(error)) from error
+    except KeyboardInterrupt:
+        left = len(existing(library))
+        typer.echo(f"ilc: stopped; {n_runs - left} runs are deleted, {left} are there", err=True)
+        raise
     if json_file is not None:
         write_text(json_file, json_text({"deleted": deleted}))
-    typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
+    typer.echo(f"{runs_counted(deleted)} deleted from {printable(library)}")
 
 
 def error_text(row: Mapping[str, Any], figure: str) -> str:
@@ -286,11 +299,14 @@ def note(row: Mapping[str, Any]) -> str:
 def _load(library: Path, run_id: int) -> dict[str, Any]:
     there = existing(library)
     try:
+        return dict(there.load(run_id))
+    except (OSError, ValueError) as error:
+        reason = str(error)
+    try:
         known = [int(row["id"]) for row in there.page()]
     except OSError as error:
         raise BadInputError(str(error)) from error
     if run_id not in known:
         ids = f"{min(known)} to {max(known)}" if known else "none"
-        message = f"{library}: no run {run_id}; there are {ids}"
-        raise BadInputError(message)
-    return dict(there.load(run_id))
+        reason = f"{library}: no run {run_id}; there are {ids}"
+    raise BadInputError(reason)

@@ -20,6 +20,7 @@ from ilc_rt.commands.network import (
     Timeout,
     described,
     listen,
+    remembering,
     whom,
 )
 from ilc_rt.comparison import Comparison
@@ -57,7 +58,8 @@ CELLS_MAX = 16
 REDRAWN_S = 0.25
 
 Runs = Annotated[
-    int | None, typer.Option("--iterations", "-n", help="End after this many runs were seen.")
+    int | None,
+    typer.Option("--iterations", "-n", min=1, help="End after this many runs were seen."),
 ]
 Raw = Annotated[
     bool,
@@ -91,7 +93,7 @@ def monitor(
     console = Console(highlight=False, markup=False, emoji=False)
     draws = is_live(console) and not plain and not events
     with (
-        Memory(library or ()) as memory,
+        remembering(library) as memory,
         listen(name, connect, scouting=scouting, router=router) as watching,
     ):
         view: _View | _Screen

@@ -10,11 +10,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ilc_rt.addresses import is_local
 from ilc_rt.campaign import load_cell
-from ilc_rt.monitor import Monitor
+from ilc_rt.errors import BadInputError
+from ilc_rt.monitor import EVERY_CELL, Monitor, checked_name
+from ilc_rt.text import printable
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from ilc_rt import Cell
+    from ilc_rt.sources import Memory
+
+#: A year.
+DURATION_MAX_S = 366 * 86_400.0
 
 CellName = Annotated[
     str, typer.Argument(metavar="[CELL]", help="Name of a cell, or its TOML file; * for all.")
@@ -29,8 +38,19 @@ Scouting = Annotated[
 Router = Annotated[
     bool, typer.Option("--router", help="Hear through a router, which --connect names.")
 ]
+
+
+def _duration(context: typer.Context, value: float | None) -> float | None:
+    """Refuse a time that never ends, or ended before."""
+    if value is not None and not context.resilient_parsing and not 0.0 <= value <= DURATION_MAX_S:
+        message = f"--timeout {value:g}: seconds from 0 to {DURATION_MAX_S:g}"
+        raise BadInputError(message)
+    return value
+
+
 Timeout = Annotated[
-    float | None, typer.Option("--timeout", metavar="SECONDS", help="End after this time.")
+    float | None,
+    typer.Option("--timeout", metavar="SECONDS", callback=_duration, help="End after this time."),
 ]
 Libraries = Annotated[
     list[str] | None,
@@ -48,10 +68,43 @@ def listen(cell: str, connect: list[str] | None, *, scouting: bool, router: bool
     return Monitor(cell, connect or (), scouting=scouting, router=router)
 
 
+def remembering(libraries: list[str] | None) -> Memory:
+    """Return the memory of some libraries; one that does not exist yet is reported.
+
+    Raises
+    ------
+    BadInputError
+        If a file is not a library, or a database cannot be read.
+    """
+    # Only here: `library` starts without NumPy, which a fleet database needs.
+    from ilc_rt.sources import Memory
+
+    memory = Memory(libraries or ())
+    try:
+        missing = memory.missing()
+    except BadInputError:
+        memory.close()
+        raise
+    tell_missing(missing)
+    return memory
+
+
+def tell_missing(names: Iterable[str]) -> None:
+    """Say which libraries do not exist yet: a name may be mistyped."""
+    for name in names:
+        typer.echo(f"{printable(name)}: no such library yet", err=True)
+
+
+def tell_others(host: str) -> None:
+    """Say so if more than this computer reaches a server at this address."""
+    if not is_local(host):
+        typer.echo("anyone on that network can watch; nobody can command", err=True)
+
+
 def described(cell: str) -> tuple[str, Cell | None]:
     """Return the name of a cell, and its description if a file was given."""
     if Path(cell).suffix != ".toml":
-        return cell, None
+        return checked_name(cell), None
     found = load_cell(cell)
     return found.name, found
 
@@ -64,4 +117,4 @@ def whom(cell: str) -> str:
     >>> whom("gantry"), whom("*")
     ('gantry', 'every cell')
     """
-    return "every cell" if cell == "*" else cell
+    return "every cell" if cell == EVERY_CELL else cell

@@ -5,6 +5,7 @@ A run is named by the number of its library and its key there, so that a browser
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from dataclasses import dataclass
 from threading import Lock
@@ -145,6 +146,14 @@ class Archive(Closing):
             self._loaded.move_to_end(cached)
             return StoredRun(key, self._loaded[cached])
 
+    def why_not(self, key: tuple[int, int]) -> str | None:
+        """Return in words why a run cannot be read; None if it can."""
+        try:
+            self.load(key)
+        except BadInputError as error:
+            return str(error)
+        return None
+
     def capture(self, cell: str, campaign: str | None) -> Capture | None:
         """Return the signals of the newest stored run of a campaign, as if they had been heard."""
         try:
@@ -210,10 +219,13 @@ def relevance(rows: Sequence[dict[str, Any]], current: dict[str, Any]) -> list[f
 
     ``N_j = 1 / (E_j + |d - d_j|^2 + 1e-6)``, with the square of the RMS error in units of its mean
     over these runs and each disturbance in units of its standard deviation; normalised to a sum of
-    1. `Library.trim` keeps runs by the same measure.
+    1. `Library.trim` keeps runs by the same measure. A run whose error has no finite square has no
+    share.
     """
-    squares = np.array([float(row["tracking_rms_m"]) ** 2 for row in rows])
-    mean = float(squares.mean()) if len(squares) else 0.0
+    with np.errstate(over="ignore"):
+        squares = np.square([_number(row["tracking_rms_m"]) for row in rows])
+    good = np.isfinite(squares)
+    mean = float(squares[good].mean()) if good.any() else 0.0
     sums = squares / mean if mean > 0.0 else np.zeros(len(rows))
     there = [row for row in (*rows, current) if row.get("disturbance") is not None]
     widths = {len(np.ravel(row["disturbance"])) for row in there}
@@ -223,6 +235,11 @@ def relevance(rows: Sequence[dict[str, Any]], current: dict[str, Any]) -> list[f
         spread[spread == 0.0] = 1.0
         away = (places - np.ravel(current["disturbance"])) / spread
         sums = sums + (away**2).sum(axis=1)
-    weights = 1.0 / (sums + 1e-6)
-    shares: list[float] = (weights / weights.sum()).tolist() if len(rows) else []
+    weights = np.where(good, 1.0 / (sums + 1e-6), 0.0)
+    shares: list[float] = (weights / weights.sum()).tolist() if good.any() else [0.0] * len(rows)
     return shares
+
+
+def _number(value: object) -> float:
+    """Return a figure of a run, NaN if it has none."""
+    return float(value) if isinstance(value, (int, float)) else math.nan

@@ -50,8 +50,10 @@ LIVE = {
 
 def build_cell(fleet: Fleet, archive: Archive, name: str) -> None:
     """Build the page of a cell."""
-    with page_frame(f"/cell/{name}"):
+    with page_frame(f"/cell/{name}", printable(name, 64)):
         if name not in fleet.cells:
+            with tag("h1", "unseen"):
+                text(printable(name))
             with tag("p", "empty"):
                 text(f"No cell {printable(name)} is watched; this page waits for it.")
             ui.timer(1.0, lambda: _reload_if(name in fleet.cells))
@@ -175,7 +177,9 @@ class CellView:
                 with tag("h1"):
                     text(printable(self._cell.name))
                 self._state = text("", "state", "state")
-                self._state.props["role"] = "status"
+                # A screen reader hears what has changed, not every second of a silence.
+                self._spoken = text("", "unseen", "spoken")
+                self._spoken.props["role"] = "status"
                 self._task = text("", "quiet end", "task")
             with tag("div", "facts"):
                 self._run = fact("run", "run")
@@ -234,6 +238,7 @@ class CellView:
         cell = self._cell
         status = cell.status(now_s)
         say(self._state, f"{status.symbol} {status.words}")
+        say(self._spoken, status.words.partition(" since ")[0])
         level(self._panel, status.level)
         say(self._task, _task(cell))
         say(self._run, run_words(cell))

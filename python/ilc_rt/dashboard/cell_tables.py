@@ -33,7 +33,8 @@ class AxisTable:
     """State and figures of each axis."""
 
     def __init__(self) -> None:
-        with tag("div", "scroll"), tag("table", "plain-table"):
+        place = tag("div", "scroll", tabindex="0", role="region", aria_label="Figures of the axes")
+        with place, tag("table", "plain-table"):
             with tag("thead"), tag("tr"):
                 for column in COLUMNS:
                     with tag("th", "text" if column in WORDS else "", scope="col"):
@@ -151,7 +152,8 @@ def _small(value: float | None, base: str) -> str:
     """Return an error or an input in millionths, which change in size as they move."""
     if value is None:
         return "-"
-    return f"{_plain(1e6 * value, 1)} µ{base}" if base[0] in "mr" else f"{value:.4g} {base}"
+    is_motion = base.startswith(("m", "r"))
+    return f"{_plain(1e6 * value, 1)} µ{base}" if is_motion else f"{value:.4g} {base}"
 
 
 def _plain(value: float, digits: int) -> str:

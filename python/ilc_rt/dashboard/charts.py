@@ -43,7 +43,7 @@ def runs(cell: CellModel) -> Option:
     option = frame("run", "")
     comparison, records = cell.comparison, cell.records
     if comparison is None:
-        return option
+        return without(option, "no run has ended yet")
     series, units = [], []
     for number, column in enumerate(comparison.errors()):
         units.append(column.unit.symbol)
@@ -73,10 +73,14 @@ def runs(cell: CellModel) -> Option:
 
 
 def live(cell: CellModel, what: str) -> Option:
-    """Return the frame of a live chart, "error", "reference" or "input"; the page adds points."""
-    option = frame("s", "")
+    """Return the frame of a live chart, "error", "reference" or "input"; the page adds points.
+
+    With the first points the page takes the words away.
+    """
+    option = frame("s", "") | words("no signals yet; in lock-step a cell sends none")
     units = cell.input_units if what == "input" else cell.units
-    groups = list(dict.fromkeys(units))[:2]
+    # The first unit has the left axis, all others share the right one.
+    groups = list(dict.fromkeys(units))
     option["yAxis"] = [
         _axis("") | {"position": side} for side in ("left", "right")[: max(1, len(groups))]
     ]
@@ -105,14 +109,16 @@ def contour(cell: CellModel, run: Capture | None, factor: int = 0) -> tuple[Opti
     """Return the path of the first two axes, with the deviation magnified, and the factor."""
     option = frame("", "")
     linear = [axis for axis, unit in enumerate(cell.units) if unit == "m"][:2]
-    if run is None or len(linear) < 2 or run.n_axes <= max(linear):
-        return option, factor
+    if len(linear) < 2:
+        return without(option, "a contour needs two linear axes"), factor
+    if run is None or run.n_axes <= max(linear):
+        return without(option, "no run has been heard to its end yet"), factor
     good = np.isfinite(run.reference_m[:, linear]).all(axis=1)
     good &= np.isfinite(run.measured_m[:, linear]).all(axis=1)
     stride = max(1, int(good.sum()) // POINTS_MAX)
     reference = run.reference_m[good][::stride][:, linear]
     if len(reference) < 2:
-        return option, factor
+        return without(option, "the run has too few samples"), factor
     away = path_deviation(reference, run.measured_m[good][::stride][:, linear])
     extent_m = float(np.ptp(reference, axis=0).max())
     factor = factor or magnification(float(np.linalg.norm(away, axis=1).max()), extent_m)
@@ -135,7 +141,7 @@ def inputs(cell: CellModel, run: Capture | None) -> Option:
     """Return the learned inputs of a run over its time."""
     option = frame("s", "")
     if run is None or not cell.cycle_s or run.n_axes != cell.n_axes:
-        return option
+        return without(option, "no run has been heard to its end yet")
     time_s: Array = np.arange(run.n_samples, dtype=np.float64) * cell.cycle_s
     sizes = [_largest(run.input[:, axis]) for axis in range(run.n_axes)]
     units = live_units(cell, "input", sizes)
@@ -193,7 +199,7 @@ def compared(stored: Sequence[StoredRun], what: str, axis: int) -> Option:
     """Return a signal of several runs over a common time, with a cursor shared by all charts."""
     option = frame("s", "")
     if not stored:
-        return option
+        return without(option, "no run is chosen")
     sizes = [_largest(run.signal(what, axis)) for run in stored]
     unit = unit_for(stored[0].unit(what, axis), max(sizes))
     for number, run in enumerate(stored):
@@ -230,6 +236,19 @@ def frame(x_name: str, y_name: str) -> Option:
         "yAxis": _axis(y_name) | {"nameGap": 8},
         "series": [],
     }  # fmt: skip
+
+
+def without(option: Option, why: str) -> Option:
+    """Return a chart that says why it shows nothing."""
+    for axis in ("xAxis", "yAxis"):
+        option[axis] |= {"show": False}
+    return option | words(why)
+
+
+def words(said: str) -> Option:
+    """Return words in the middle of a chart."""
+    style = {"color": "$ticks", "fontSize": 12, "fontWeight": "normal"}
+    return {"title": {"text": said, "left": "center", "top": "middle", "textStyle": style}}
 
 
 def line(name: str, number: int, data: list[Any], *, symbol: bool = False) -> Option:

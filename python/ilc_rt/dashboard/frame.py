@@ -20,14 +20,16 @@ PAGES = {"/": "Cells", "/library": "Library"}
 
 
 @contextmanager
-def page_frame(here: str) -> Iterator[None]:
-    """Build the head of a page; the block builds the rest."""
+def page_frame(here: str, name: str = "") -> Iterator[None]:
+    """Build the head of a page, `name` in its title; the block builds the rest."""
+    title = name or PAGES.get(here, "")
+    ui.page_title(f"{title} - ilc-rt")
     ui.add_head_html(STUB)
     with tag("header", "bar"):
         text("ilc-rt", "brand")
         with tag("nav", aria_label="Pages"):
-            for path, name in PAGES.items():
-                link = ui.link(name, path)
+            for path, page in PAGES.items():
+                link = ui.link(page, path)
                 if path == here:
                     link.props["aria-current"] = "page"
         with tag("div", "end"):
@@ -36,6 +38,10 @@ def page_frame(here: str) -> Iterator[None]:
             switch.props["data-theme-switch"] = ""
             switch.on("click", js_handler="() => window.ilc.theme()")
     with tag("div", "body"):
+        if not name:
+            # The page of a cell has its own heading.
+            with tag("h1", "unseen"):
+                text(title)
         yield
 
 

@@ -16,6 +16,7 @@ from ilc_rt.errors import BadInputError
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from nicegui import Client
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 SHOWN_MAX = 300
 CHOSEN_MAX = 8
 REFRESH_S = 2.0
+NOTHING_CHOSEN = "Choose runs above: they are laid over each other here."
+HINT = "one cursor for all charts; wheel or two fingers zoom"
 SIGNALS = {"error": "Tracking error", "command": "Set point", "input": "Learned input"}
 
 
@@ -80,6 +83,19 @@ class LibraryView:
             self._state = state
             self._rows = rows
             self._show()
+            await self._forget_deleted()
+
+    async def _forget_deleted(self) -> None:
+        """Choose no longer what was deleted meanwhile, as by `ilc library trim`."""
+        there = {key_of(row) for row in self._rows}
+        gone = [key for key in self._chosen if key not in there]
+        if not gone:
+            return
+        for key in gone:
+            del self._chosen[key]
+        self._show_note()
+        n_gone = f"{len(gone)} chosen run{'' if len(gone) == 1 else 's'}"
+        await self._compare([f"{n_gone} deleted meanwhile"])
 
     def _build(self) -> None:
         with panel("Runs", "full") as head:
@@ -91,10 +107,11 @@ class LibraryView:
                 search.on(
                     "input", self._search, js_handler="(e) => emit(e.target.value)", throttle=0.3
                 )
-            self._told = text("", "quiet", "told")
+            self._told = text("The libraries are being read …", "quiet", "told")
+            self._told.props["role"] = "status"
             self._body = runs_table()
         with panel("Comparison", "full") as head:
-            self._which = text("Choose runs above: they are laid over each other here.", "quiet")
+            self._which = text(NOTHING_CHOSEN, "quiet", "compared")
             with head, tag("div", "controls end"):
                 with tag("label"):
                     text("axis")
@@ -147,12 +164,10 @@ class LibraryView:
         self._show_note()
         await self._compare()
 
-    async def _compare(self) -> None:
-        try:
-            runs = await asyncio.to_thread(self._archive.aligned, list(self._chosen), self._axis)
-        except BadInputError as error:
-            say(self._which, f"▲ {printable(error)}")
-            return
+    async def _compare(self, said: Sequence[str] = ()) -> None:
+        """Draw the chosen runs that can be read, and tell the others after `said`."""
+        keys, lost = await asyncio.to_thread(self._readable)
+        runs = await asyncio.to_thread(self._archive.aligned, keys, self._axis)
         names = list(dict.fromkeys(name for one in runs for name in one.row["axis_names"]))
         self._axis = min(self._axis, max(0, len(names) - 1))
         self._axes.clear()
@@ -160,14 +175,16 @@ class LibraryView:
             for number, name in enumerate(names):
                 with tag("option", value=str(number), selected=number == self._axis):
                     text(printable(name, 40))
-        say(
-            self._which,
-            f"{len(runs)} of at most {CHOSEN_MAX} runs; one cursor for all charts, the wheel zooms"
-            if runs
-            else "Choose runs above: they are laid over each other here.",
-        )
+        warnings = [f"▲ {printable(one)}. " for one in (*said, *lost)]
+        count = f"{len(runs)} of at most {CHOSEN_MAX} runs; {HINT}"
+        say(self._which, "".join(warnings) + (count if runs else NOTHING_CHOSEN))
         for what in SIGNALS:
             draw(self._client, f"compare-{what}", charts.compared(runs, what, self._axis))
+
+    def _readable(self) -> tuple[list[Key], list[str]]:
+        """Return the chosen runs that can be read, and why the others cannot."""
+        whys = {key: self._archive.why_not(key) for key in list(self._chosen)}
+        return [key for key, why in whys.items() if why is None], [*filter(None, whys.values())]
 
     async def _choose_axis(self, event: Any) -> None:  # noqa: ANN401 (of NiceGUI)
         chosen = str(event.args)

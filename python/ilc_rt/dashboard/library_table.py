@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
     Key = tuple[int, int]
 
+#: In the order in which they are wanted: a phone shows the first ones.
 COLUMNS = (
-    "campaign", "run", "cell", "law", "max tracking", "max contour", "distance", "relevance",
-    "outcome", "note", "made (UTC)",
+    "campaign", "run", "max tracking", "max contour", "outcome", "cell", "law", "distance",
+    "relevance", "note", "made (UTC)",
 )  # fmt: skip
 TEXTS = ("campaign", "cell", "law", "outcome", "note", "made (UTC)")
 MEANINGS = {
@@ -36,7 +37,8 @@ def key_of(row: Mapping[str, Any]) -> Key:
 
 def runs_table() -> Element:
     """Build the table without lines, and return its body."""
-    with tag("div", "runs-table", tabindex="0"), tag("table", "plain-table"):
+    place = tag("div", "runs-table", tabindex="0", role="region", aria_label="Stored runs")
+    with place, tag("table", "plain-table"):
         with tag("thead"), tag("tr"):
             for column in ("compare", *COLUMNS):
                 kind = "text" if column in TEXTS else ""

@@ -17,6 +17,7 @@ PAGE = {
 #: Calls that come before the script has loaded wait in a queue.
 STUB = """
 <script>
+document.documentElement.lang = "en";
 window.ilc = {queue: []};
 for (const name of ["draw", "live", "theme"])
   window.ilc[name] = (...values) => window.ilc.queue.push([name, ...values]);

@@ -5,6 +5,8 @@ The library has no place for them, and stays as the controller wrote it.
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
 import os
 import tempfile
@@ -15,7 +17,7 @@ from typing import TYPE_CHECKING
 from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
 NOTE_MAX = 2_000
 FILE_MAX_BYTES = 16 << 20
@@ -82,16 +84,29 @@ def write_note(library: Path, run: str, text: str) -> None:
         message = f"note of {len(text)} characters: at most {NOTE_MAX}"
         raise BadInputError(message)
     file = notes_file(library)
-    with _lock:
-        notes = read_notes(library)
-        notes.pop(run, None)
-        if text:
-            notes[run] = text
-        try:
-            _replace(file, json.dumps(notes, indent=1, ensure_ascii=False, sort_keys=True) + "\n")
-        except OSError as error:
-            message = f"{file}: cannot be written: {error.strerror}"
-            raise BadInputError(message) from error
+    try:
+        with _lock, _alone_in(file.parent):
+            notes = read_notes(library)
+            notes.pop(run, None)
+            if text:
+                notes[run] = text
+            written = json.dumps(notes, indent=1, ensure_ascii=False, sort_keys=True)
+            _replace(file, written + "\n")
+    except OSError as error:
+        message = f"{file}: cannot be written: {error.strerror}"
+        raise BadInputError(message) from error
+
+
+@contextlib.contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Keep other dashboards from writing notes in a folder; no file is left behind."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        # The lock ends with the handle.
+        os.close(handle)
 
 
 def _replace(file: Path, text: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 import signal
 import socket
 import threading
@@ -17,6 +16,7 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
+from ilc_rt.addresses import is_local, unusable
 from ilc_rt.dashboard.cell_page import build_cell
 from ilc_rt.dashboard.library_page import build_library
 from ilc_rt.dashboard.look import colours, text_of
@@ -55,27 +55,8 @@ def listen(host: str, port: int) -> socket.socket:
             listener.close()
             raise
     except OSError as error:
-        reason = error.strerror or error
-        message = (
-            f"--host {host} --port {port}: {reason}; an own address and a free port are needed"
-        )
-        raise BadInputError(message) from error
+        raise BadInputError(unusable(host, port, error.strerror or error)) from error
     return listener
-
-
-def is_local(host: str) -> bool:
-    """Return whether only this computer reaches a server at this address.
-
-    Examples
-    --------
-    >>> is_local("127.0.0.1"), is_local("localhost"), is_local("0.0.0.0")
-    (True, True, False)
-    """
-    if host == "localhost":
-        return True
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(host).is_loopback
-    return False
 
 
 def serve(

@@ -4,6 +4,7 @@ import { echarts } from "/echarts/index.js";
 
 const charts = new Map(); // name -> {element, chart, option, live}
 const queued = window.ilc.queue;
+const ROW_PX = 15, NARROW_PX = 480;
 
 function colour(name) {
   return getComputedStyle(document.body).getPropertyValue(`--${name}`).trim();
@@ -47,10 +48,37 @@ function equalScales(entry, option) {
   });
 }
 
+const pen = document.createElement("canvas").getContext("2d");
+
+function namesInRows(entry, option) {
+  // A narrow chart has all its names above it, in rows, in place of a few with arrows.
+  const width = entry.element.clientWidth;
+  entry.element.style.removeProperty("--names");
+  if (width > NARROW_PX || !option.legend || !option.series.length) return;
+  const { itemWidth, textStyle, left } = option.legend;
+  pen.font = `${textStyle.fontSize}px sans-serif`;
+  // With the gaps of ECharts: 5 before a name, 10 behind it.
+  const sizes = option.series.map((series) => itemWidth + 5 + pen.measureText(series.name).width + 10);
+  if (left + sizes.reduce((sum, size) => sum + size, 0) <= width) return;
+  let rows = 1, at = 0;
+  for (const size of sizes) {
+    if (at > 0 && at + size > width - 8) {
+      rows += 1;
+      at = 0;
+    }
+    at += size;
+  }
+  Object.assign(option.legend, { type: "plain", left: 0, right: 0 });
+  // The name of the axis stays below the names of the lines.
+  option.grid.top += ROW_PX * rows;
+  entry.element.style.setProperty("--names", `${ROW_PX * rows}px`);
+}
+
 function paint(entry) {
   if (!entry.chart || !entry.option) return;
   const option = coloured(entry.option);
   delete option.ilc;
+  namesInRows(entry, option);
   if (entry.option.ilc?.equal) equalScales(entry, option);
   const zoom = entry.chart.getOption()?.dataZoom?.[0];
   if (zoom && option.dataZoom) Object.assign(option.dataZoom[0], { start: zoom.start, end: zoom.end });
@@ -66,9 +94,12 @@ function entryOf(name) {
     entry?.chart?.dispose();
     entry = { element, chart: echarts.init(element, null, { renderer: "canvas" }) };
     charts.set(name, entry);
+    entry.width = element.clientWidth;
     new ResizeObserver(() => {
       entry.chart.resize();
-      if (entry.option?.ilc?.equal) paint(entry);
+      const width = element.clientWidth;
+      if (entry.option?.ilc?.equal || (width !== entry.width && Math.min(width, entry.width) <= NARROW_PX)) paint(entry);
+      entry.width = width;
     }).observe(element);
   }
   return entry;
@@ -152,7 +183,7 @@ function paintLive(entry) {
     return { data };
   });
   const yAxis = [...new Set(units)].slice(0, 2).map((unit) => ({ name: unit }));
-  entry.chart.setOption({ series, yAxis, xAxis: { min: -ring.length * ring.seconds, max: 0, axisLabel: { showMinLabel: false } } }, { lazyUpdate: true });
+  entry.chart.setOption({ title: { show: false }, series, yAxis, xAxis: { min: -ring.length * ring.seconds, max: 0, axisLabel: { showMinLabel: false } } }, { lazyUpdate: true });
 }
 
 // ---- theme, and loss of the connection

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Statements that wait while the database cannot be reached; the oldest are left to sync.
 WAITING_MAX = 10_000
+#: Cells at most; any program on the network can publish under any name.
+CELLS_MAX = 10_000
 
 INSERT = """
 INSERT INTO run (cell, campaign, iteration, digest, created_utc, law, measure, cycle_s, n_axes,
@@ -55,6 +57,8 @@ class Collector(Closing):
         Runs stored so far.
     unknown : set of str
         Cells whose runs were left out, as their campaign had begun before: sync brings them.
+    refused : str or None
+        Newest event that the database refuses, and why: none of a controller.
 
     Raises
     ------
@@ -65,6 +69,7 @@ class Collector(Closing):
     def __init__(self, address: str) -> None:
         self.stored = 0
         self.unknown: set[str] = set()
+        self.refused: str | None = None
         self._address = address
         self._connection: psycopg.Connection[Any] = connect(address)
         self._started: dict[str, StartEvent] = {}
@@ -83,6 +88,9 @@ class Collector(Closing):
     def take(self, message: Message) -> None:
         """Store what a message tells of a run; other messages change nothing."""
         event = message.event
+        is_known = message.cell in self._started or message.cell in self.unknown
+        if not is_known and len(self._started) + len(self.unknown) >= CELLS_MAX:
+            return
         if isinstance(event, StartEvent):
             self._started[message.cell] = event
         if not isinstance(event, (IterationEvent, JudgedEvent)):
@@ -110,8 +118,13 @@ class Collector(Closing):
                 )
             while self._waiting:
                 statement, values = self._waiting[0]
-                done = self._connection.execute(statement.encode(), values)
-                self.stored += statement is INSERT and done.rowcount == 1
+                try:
+                    done = self._connection.execute(statement.encode(), values)
+                    self.stored += statement is INSERT and done.rowcount == 1
+                except (postgres.DataError, postgres.IntegrityError) as error:
+                    # Any program can publish: the next event must not wait for this one.
+                    why = str(error).partition("\n")[0]
+                    self.refused = f"run {values['iteration']} of {values['cell']}: {why}"
                 self._waiting.popleft()
         except postgres.OperationalError:
             self._connection.close()
