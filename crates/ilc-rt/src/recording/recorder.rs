@@ -268,6 +268,7 @@ impl Writing {
         match self.write(&mut file, &ticks, &notes) {
             Ok(()) => self.file = Some(file),
             Err(error) => {
+                file.abandon();
                 let _ = self.news.send(format!("the recording ends early: {error}"));
                 return;
             }
