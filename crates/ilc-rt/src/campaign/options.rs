@@ -4,6 +4,7 @@
 //! [`crate::cli::described`] and hand their options over as such a command line. A field of this file is an
 //! option everywhere.
 
+use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, AtomicU32};
@@ -56,6 +57,9 @@ pub struct Session {
     /// repeats it.
     #[arg(long, value_name = "FILE|DIR")]
     pub record: Option<PathBuf>,
+    /// Open file that is recorded into, e.g. a pipe to another program; `record` then names it only.
+    #[arg(skip)]
+    pub record_to: Option<Arc<File>>,
     /// Do not publish on Zenoh.
     #[arg(long = "no-telemetry", action = ArgAction::SetFalse)]
     pub telemetry: bool,

@@ -12,7 +12,9 @@ use crate::fieldbus::cia402::PdoMap;
 use crate::fieldbus::transport::TappedBus;
 use crate::learning::Law;
 use crate::record::{Event, fingerprint};
-use crate::recording::{LoopSetup, MapText, Place, Recorder, VERSION, cell_digest, is_folder};
+use crate::recording::{
+    LoopSetup, MapText, Place, Recorder, RecordingError, VERSION, cell_digest, is_folder,
+};
 use crate::rt::{Clock, MonotonicClock, Nanos};
 use crate::servo::{Cycle, Tap};
 
@@ -38,10 +40,18 @@ pub(super) fn begin(
         let end = path.extension().map(|end| format!(".{}", end.to_string_lossy()));
         path.set_file_name(format!("{stem}-{}{}", earlier + 1, end.unwrap_or_default()));
     }
-    let bytes = section.keep_mb.map(|megabytes| u64::from(megabytes) * MEGABYTE);
-    let place = Place { path, files: section.keep, bytes };
     let axes: Vec<String> = cell.axes.iter().map(|axis| axis.name.clone()).collect();
     let pace = (cell.cycle_s(), session.lockstep);
+    if let Some(file) = &session.record_to {
+        let refused = |error: std::io::Error| RecordingError::Create {
+            path: path.clone(),
+            reason: error.to_string(),
+        };
+        let file = file.try_clone().map_err(refused)?;
+        return Ok(Some(Recorder::into_open(file, &path, &axes, pace)?));
+    }
+    let bytes = section.keep_mb.map(|megabytes| u64::from(megabytes) * MEGABYTE);
+    let place = Place { path, files: section.keep, bytes };
     Ok(Some(Recorder::create(&place, (&cell.cell.name, campaign), &axes, pace)?))
 }
 

@@ -54,6 +54,7 @@ impl Moving {
             home: false,
             library: PathBuf::new(),
             record: None,
+            record_to: None,
             recordings: Arc::default(),
             telemetry: false,
             stop,

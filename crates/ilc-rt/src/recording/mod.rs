@@ -14,11 +14,11 @@ mod error;
 mod exact;
 mod file;
 mod folder;
-mod mcap;
 mod message;
 mod notation;
 mod reader;
 mod recorder;
+mod records;
 mod schema;
 mod setup;
 

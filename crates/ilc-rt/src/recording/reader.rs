@@ -5,13 +5,14 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use mcap::records::Record;
 use serde::Deserialize;
 use serde_json::Value;
 
 use super::error::RecordingError;
 use super::file::{CELL, PROGRAM, SETUP};
-use super::mcap::{Record, Records};
 use super::message::{AxisMessage, CycleMessage, FramesMessage, TableMessage, TimingMessage};
+use super::records::Records;
 use super::setup::{LoopSetup, VERSION};
 use crate::config::Cell;
 use crate::record::fingerprint;
@@ -103,23 +104,23 @@ impl<R: Read> Reader<R> {
                 return Ok(None);
             };
             match record {
-                Record::Channel { id, topic } => {
-                    self.channels.insert(id, topic);
+                Record::Channel(channel) => {
+                    self.channels.insert(channel.id, channel.topic);
                 }
-                Record::Attachment { name, data } => {
-                    if let Some(item) = self.attachment(&name, &data)? {
+                Record::Attachment { header, data, .. } => {
+                    if let Some(item) = self.attachment(&header.name, &data)? {
                         return Ok(Some(item));
                     }
                 }
-                Record::Metadata { name, fields } if name == "end" => {
-                    self.n_lost = fields.get("lost").and_then(|text| text.parse().ok());
+                Record::Metadata(end) if end.name == "end" => {
+                    self.n_lost = end.metadata.get("lost").and_then(|text| text.parse().ok());
                 }
-                Record::Message { channel, log_time, data } => {
-                    if let Some(item) = self.message(channel, log_time, &data)? {
+                Record::Message { header, data } => {
+                    if let Some(item) = self.message(header.channel_id, header.log_time, &data)? {
                         return Ok(Some(item));
                     }
                 }
-                Record::Metadata { .. } | Record::Other => {}
+                _ => {}
             }
         }
     }

@@ -3,6 +3,7 @@
 //! In real time on its own thread; in lock-step in line, so that nothing is ever lost. A file that cannot be written
 //! ends the recording, never the run.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -105,6 +106,8 @@ pub struct Recorder {
     news: Receiver<String>,
     writing: Pace,
     count: Arc<TapCount>,
+    /// Lost records that were reported.
+    told: u64,
 }
 
 enum Pace {
@@ -130,10 +133,32 @@ impl Recorder {
         (cycle_s, lockstep): (f64, bool),
     ) -> Result<Self, RecordingError> {
         let (file, path) = folder::create(&place.path, &format!("{cell}@{campaign}"))?;
-        let refused = |reason: String| RecordingError::Create { path: path.clone(), reason };
         if folder::is_folder(&place.path) {
             folder::thin(&path, cell, place.files, place.bytes);
         }
+        Self::begin((file, path, true), place.bytes, axes, (cycle_s, lockstep))
+    }
+
+    /// Records into an open file, e.g. a pipe; `path` names it.
+    ///
+    /// # Errors
+    /// [`RecordingError::Create`] if its beginning cannot be written.
+    pub fn into_open(
+        file: File,
+        path: &Path,
+        axes: &[String],
+        pace: (f64, bool),
+    ) -> Result<Self, RecordingError> {
+        Self::begin((file, path.to_owned(), false), None, axes, pace)
+    }
+
+    fn begin(
+        (file, path, is_ours): (File, PathBuf, bool),
+        bytes_max: Option<u64>,
+        axes: &[String],
+        (cycle_s, lockstep): (f64, bool),
+    ) -> Result<Self, RecordingError> {
+        let refused = |reason: String| RecordingError::Create { path: path.clone(), reason };
         let file = RecordFile::begin(file, axes).map_err(|error| refused(error.to_string()))?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded")]
         let room = |per_tick: usize| ((ROOM_S / cycle_s) as usize * per_tick).clamp(ROOM.0, ROOM.1);
@@ -152,13 +177,13 @@ impl Recorder {
             count: Arc::clone(&count),
             news: news_in,
             path: path.clone(),
-            bytes_max: place.bytes,
+            is_ours,
+            bytes_max,
             n_axes: axes.len(),
             now: Nanos(0),
             cycle: 0,
             axis: 0,
             flushed: Instant::now(),
-            has_lost: false,
             has_loop: false,
         };
         let writing = if lockstep {
@@ -179,7 +204,7 @@ impl Recorder {
             Pace::Thread { ends, thread: Some(thread) }
         };
         let taps = Some(Taps { records, traffic, count: Arc::clone(&count) });
-        Ok(Self { path, notes: Notes(Some(notes_in)), taps, news, writing, count })
+        Ok(Self { path, notes: Notes(Some(notes_in)), taps, news, writing, count, told: 0 })
     }
 
     /// Returns the file.
@@ -202,15 +227,21 @@ impl Recorder {
         self.count.lost()
     }
 
-    /// Writes what there is, in lock-step; returns the reason if the recording has ended or lost records since.
+    /// Writes what there is, in lock-step; returns the reason if the recording has ended since, or begins to lose
+    /// records, even while its writer is held.
     pub fn poll(&mut self) -> Option<String> {
         if let Pace::InLine(writing) = &mut self.writing {
             writing.look();
         }
-        self.news.try_recv().ok()
+        let news = self.news.try_recv().ok();
+        if news.is_some() || self.told > 0 {
+            return news;
+        }
+        self.told = self.lost();
+        (self.told > 0).then(|| "records are lost: this computer writes too slowly".to_owned())
     }
 
-    /// Ends the file; returns the reason if that failed.
+    /// Ends the file; returns the reason if that failed, or the number of records lost if it has grown.
     pub fn end(&mut self) -> Option<String> {
         match &mut self.writing {
             Pace::InLine(writing) => writing.end(),
@@ -221,7 +252,10 @@ impl Recorder {
                 }
             }
         }
-        self.news.try_recv().ok()
+        let (lost, path) = (self.lost(), self.path.display());
+        let has_grown = lost > std::mem::replace(&mut self.told, lost);
+        let all = has_grown.then(|| format!("{path}: {lost} records are lost in all"));
+        self.news.try_recv().ok().or(all)
     }
 }
 
@@ -241,6 +275,8 @@ struct Writing {
     count: Arc<TapCount>,
     news: Sender<String>,
     path: PathBuf,
+    /// True for a file of its own, which goes if there is nothing to keep.
+    is_ours: bool,
     bytes_max: Option<u64>,
     n_axes: usize,
     /// Time of the last tick.
@@ -249,7 +285,6 @@ struct Writing {
     /// Next axis of this tick.
     axis: usize,
     flushed: Instant,
-    has_lost: bool,
     /// True once it holds a loop. Without one, as nothing has moved, there is nothing to keep.
     has_loop: bool,
 }
@@ -268,13 +303,10 @@ impl Writing {
         match self.write(&mut file, &ticks, &notes) {
             Ok(()) => self.file = Some(file),
             Err(error) => {
+                file.abandon();
                 let _ = self.news.send(format!("the recording ends early: {error}"));
                 return;
             }
-        }
-        if self.count.lost() > 0 && !self.has_lost {
-            self.has_lost = true;
-            let _ = self.news.send("records are lost: this computer writes too slowly".to_owned());
         }
         if let Some(max) = self.bytes_max
             && self.file.as_ref().is_some_and(|file| file.n_bytes() > max)
@@ -371,7 +403,7 @@ impl Writing {
     /// Writes the rest, and the end.
     fn end(&mut self) {
         self.look_at_rest();
-        if !self.has_loop && self.file.take().is_some() {
+        if self.is_ours && !self.has_loop && self.file.take().is_some() {
             // A failure is harmless: a short file remains.
             let _ = std::fs::remove_file(&self.path);
         }

@@ -22,6 +22,7 @@ use ilc_tests::far_side::FarSide;
 use ilc_tests::{Scratch, example, example_path, patient, short};
 
 mod changed;
+mod held;
 
 /// Cells of every mode and architecture: positions, velocities, torque, offsets, a tool, two arms, a delta mechanism.
 const CELLS: [&str; 8] = [

@@ -155,5 +155,9 @@ pub fn replay_read<R: Read>(mut reader: Reader<R>, path: &Path) -> Result<Replay
     let Some(player) = player else {
         return Err(contradiction("it holds no loop: nothing was moved".to_owned()));
     };
+    // What is lost up to the end leaves no cycle behind that tells it.
+    if lost_at.is_none() && reader.n_lost() > Some(0) {
+        lost_at = Some(player.next_cycle());
+    }
     Ok(Replayed { lost_at, cut: reader.was_cut(), ..player.end() })
 }
