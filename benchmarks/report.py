@@ -14,12 +14,13 @@ from typing import Any, NoReturn
 
 import border
 import bounded
+import moves
 import prediction
 import update
 
 ROOT = Path(__file__).resolve().parent.parent
 BORDER = (1300, 30_000, 100_000)
-PEERS = ("numpy", "scipy", "osqp", "clarabel", "piqp")
+PEERS = ("numpy", "scipy", "osqp", "clarabel", "piqp", "ruckig")
 
 
 def main() -> None:
@@ -69,6 +70,15 @@ def main() -> None:
         "",
     ]
     lines += table({1300: progress("bounded, N = 1300", bounded.compare, 1300)})
+    lines += [
+        "",
+        "## Plans of jerk-limited moves, from Python",
+        "",
+        "`MovePlan` from motion to rest, and programs of many moves; as short as those of Ruckig.",
+        "",
+    ]
+    axes = {n: progress(f"moves, {n} axes", moves.compare, n) for n in (1, 2, 6)}
+    lines += table(axes, "axes")
     million = json.loads(command(sys.executable, str(ROOT / "benchmarks" / "million.py")))
     lines += [
         "",
@@ -97,12 +107,13 @@ def progress(what: str, compare: object, n_samples: int) -> dict[str, float]:
     return compare(n_samples)
 
 
-def table(columns: dict[int, dict[str, float]]) -> list[str]:
+def table(columns: dict[int, dict[str, float]], counted: str = "N") -> list[str]:
     """Return a row for each solver, with its time absolute and relative to ours."""
     names = list(next(iter(columns.values()), {}))
     if not names or any("ilc-rt" not in seconds for seconds in columns.values()):
-        fail(f"a table of {', '.join(f'N = {n}' for n in columns) or 'nothing'} has no figures")
-    head = "| solver |" + "".join(f" N = {n} | times ours |" for n in columns)
+        sizes = ", ".join(f"{counted} = {n}" for n in columns)
+        fail(f"a table of {sizes or 'nothing'} has no figures")
+    head = "| solver |" + "".join(f" {counted} = {n} | times ours |" for n in columns)
     rows = [head, "|---|" + "--:|--:|" * len(columns)]
     for name in names:
         cells = "".join(

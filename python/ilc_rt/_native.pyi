@@ -468,6 +468,32 @@ def contour_error(
 ) -> NDArray[np.float64]: ...
 
 @disjoint_base
+class MovePlan:
+    def __new__(
+        cls,
+        points_m: ArrayLike,
+        feed_m_s: float | ArrayLike,
+        velocity_max_m_s: float | ArrayLike,
+        acceleration_max_m_s2: float | ArrayLike,
+        jerk_max_m_s3: float | ArrayLike,
+        setting: str,
+        start_velocity_m_s: float | ArrayLike,
+    ) -> Self: ...
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def nominal_s(self) -> float: ...
+    @property
+    def n_axes(self) -> int: ...
+    @property
+    def n_moves(self) -> int: ...
+    @property
+    def starts_s(self) -> NDArray[np.float64]: ...
+    def at(
+        self, t_s: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+
+@disjoint_base
 class Line(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
 

@@ -183,6 +183,16 @@ EXAMPLES = {
         lambda: CrossCoupled(Pid(10.0, dt_s=0.001)),
         lambda c: [c.step([0.0, 0.5], [0.0, 1.0])[0].tolist() for _ in range(3)],
     ),
+    trajectory.MovePlan: (
+        lambda: trajectory.MovePlan(
+            [[0.0, 0.0], [0.1, 0.05], [0.0, 0.0]],
+            feed_m_s=[0.1, 0.2],
+            setting="on_time",
+            start_velocity_m_s=[0.05, 0.0],
+            **limits(),
+        ),
+        lambda plan: [table.tolist() for table in plan.at([0.0, 0.4, 1.1])],
+    ),
     trajectory.Line: (
         lambda: trajectory.Line([0.0, 0.0], [1.0, 2.0]),
         lambda piece: trajectory.contour_error([piece], [[0.5, 0.25]]),

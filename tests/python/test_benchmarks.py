@@ -17,7 +17,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 def report(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     # The comparisons need packages that are not installed where the tests run.
-    for name in ("border", "bounded", "prediction", "update"):
+    for name in ("border", "bounded", "moves", "prediction", "update"):
         monkeypatch.setitem(sys.modules, name, type(sys)(name))
     spec = importlib.util.spec_from_file_location("benchmark_report", FOLDER / "report.py")
     module = importlib.util.module_from_spec(spec)
@@ -42,6 +42,8 @@ def test_no_figures_are_a_failure_with_a_sentence(report, tmp_path, monkeypatch)
         report.main()
     with pytest.raises(SystemExit, match="N = 400 has no figures"):
         report.table({400: {}})
+    with pytest.raises(SystemExit, match="axes = 2 has no figures"):
+        report.table({2: {"another": 1.0}}, "axes")
     with pytest.raises(SystemExit, match="no figures"):
         report.table({})
 

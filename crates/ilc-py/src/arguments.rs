@@ -7,7 +7,7 @@ use ilc_rt::learning::weights::Weight;
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyList, PyString};
 
 use crate::argument::{Matrix, Signal, misfit, read_array, read_pair, read_vector};
 use crate::model_argument::read_model;
@@ -113,17 +113,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
 
     /// Reads one of several words, each with its meaning.
     pub(crate) fn choice<T: Copy>(self, name: &str, choices: &[(&str, T)]) -> PyResult<T> {
-        let text = self.text(name)?;
-        if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
-            return Ok(*meaning);
-        }
-        let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
-        let (last, others) = words
-            .split_last()
-            .map_or((String::new(), &words[..]), |(last, others)| (last.clone(), others));
-        let text = shown(&self.get(name)?);
-        let others = others.join(", ");
-        Err(PyValueError::new_err(format!("{name} = {text}; {others} or {last} is needed")))
+        chosen(name, &self.get(name)?, choices)
     }
 
     /// Reads a time-invariant model.
@@ -198,4 +188,22 @@ impl<'a, 'py> Arguments<'a, 'py> {
         }
         Ok(format!("{name}({})", words.join(", ")))
     }
+}
+
+/// Reads one of several words, each with its meaning.
+pub(crate) fn chosen<T: Copy>(
+    name: &str,
+    word: &Bound<'_, PyAny>,
+    choices: &[(&str, T)],
+) -> PyResult<T> {
+    let text = word.cast::<PyString>().map_err(|_| refused(name, word, "a text"))?.to_str()?;
+    if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
+        return Ok(*meaning);
+    }
+    let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
+    let (last, others) = words
+        .split_last()
+        .map_or((String::new(), &words[..]), |(last, others)| (last.clone(), others));
+    let (text, others) = (shown(word), others.join(", "));
+    Err(PyValueError::new_err(format!("{name} = {text}; {others} or {last} is needed")))
 }

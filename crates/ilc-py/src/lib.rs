@@ -33,6 +33,7 @@ mod made;
 mod many;
 mod model;
 mod model_argument;
+mod move_plan;
 mod python_law;
 mod signal;
 mod time_varying;
@@ -83,6 +84,8 @@ mod _native {
     use super::many::simulate_many;
     #[pymodule_export]
     use super::model::{PyStateSpace, discretize, from_transfer_function, second_order};
+    #[pymodule_export]
+    use super::move_plan::PyMovePlan;
     #[pymodule_export]
     use super::signal::{PyFilter, instantaneous_frequency, zero_phase};
     #[pymodule_export]

@@ -14,6 +14,7 @@ use ilc_rt::trajectory::{
     POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex, TrajectoryError,
     points_program,
 };
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -29,8 +30,12 @@ type Alpha = (usize, String, f64, Vec<(f64, f64)>);
 /// A planned motion.
 type Planned = Result<(SampledMotion, Vec<Alpha>), TrajectoryError>;
 
-const SETTINGS: [(&str, LinearSetting); 2] =
+/// Settings by name.
+pub(crate) const SETTINGS: [(&str, LinearSetting); 2] =
     [("complete", LinearSetting::CompleteEveryMove), ("on_time", LinearSetting::StartOnTime)];
+
+/// Names of the limits of the axes.
+const LIMITS: [&str; 3] = ["velocity_max_m_s", "acceleration_max_m_s2", "jerk_max_m_s3"];
 
 /// Plans a motion while other Python threads run, and returns its samples by name.
 fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> ByName<'_> {
@@ -56,8 +61,10 @@ fn read_points(a: Arguments<'_, '_>) -> PyResult<Vec<Vec<f64>>> {
 }
 
 /// Reads a number for all of `n`, or one for each.
-fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<f64>> {
-    if let Ok(value) = object.extract::<f64>() {
+pub(crate) fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<f64>> {
+    // Of an array NumPy would make a number with a warning, or an exception.
+    let is_array = object.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0);
+    if !is_array && let Ok(value) = object.extract::<f64>() {
         return Ok(vec![value; n]);
     }
     let values = read_vector(name, object)?;
@@ -72,13 +79,21 @@ fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<f6
 
 /// Reads the limits of `n_axes` axes.
 fn read_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<Vec<AxisLimits>> {
+    let [velocity, acceleration, jerk] = LIMITS.map(|name| a.get(name));
+    limits_of(n_axes, [&velocity?, &acceleration?, &jerk?])
+}
+
+/// Reads the limits of `n_axes` axes from those of velocity, acceleration and jerk.
+pub(crate) fn limits_of(
+    n_axes: usize,
+    [velocity, acceleration, jerk]: [&Bound<'_, PyAny>; 3],
+) -> PyResult<Vec<AxisLimits>> {
     if !(1..=MAX_AXES).contains(&n_axes) {
         return Err(TrajectoryError::from(MoveError::Axes { n_axes })).or_raise();
     }
-    let each = |name: &str| read_each(name, &a.get(name)?, n_axes);
-    let velocity = each("velocity_max_m_s")?;
-    let acceleration = each("acceleration_max_m_s2")?;
-    let jerk = each("jerk_max_m_s3")?;
+    let velocity = read_each(LIMITS[0], velocity, n_axes)?;
+    let acceleration = read_each(LIMITS[1], acceleration, n_axes)?;
+    let jerk = read_each(LIMITS[2], jerk, n_axes)?;
     let axis = |i| AxisLimits {
         velocity_max_m_s: velocity[i],
         acceleration_max_m_s2: acceleration[i],

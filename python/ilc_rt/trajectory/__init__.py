@@ -9,6 +9,7 @@ from ilc_rt.trajectory.contour import (
     projection_across,
 )
 from ilc_rt.trajectory.curves import butterfly, spiral, spline
+from ilc_rt.trajectory.move_plan import MovePlan
 from ilc_rt.trajectory.moves import exponential_sigmoid, jerk_limited, modulated, sigmoid_pair
 from ilc_rt.trajectory.programs import gcode, raster
 from ilc_rt.trajectory.sampled import Trajectory, tracking_index
@@ -17,6 +18,7 @@ __all__ = [
     "Arc",
     "ContourError",
     "Line",
+    "MovePlan",
     "Trajectory",
     "butterfly",
     "contour_error",

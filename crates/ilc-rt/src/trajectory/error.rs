@@ -30,6 +30,15 @@ pub enum TrajectoryError {
         /// The value given.
         feed: f64,
     },
+    /// A program begins faster than an axis may move.
+    StartVelocity {
+        /// Index of the axis.
+        axis: usize,
+        /// The value given.
+        velocity: f64,
+        /// The limit.
+        limit: f64,
+    },
     /// A segment ends where it starts.
     ZeroLength {
         /// Index of the segment.
@@ -217,7 +226,8 @@ impl TrajectoryError {
     pub fn axis(&self) -> Option<usize> {
         match *self {
             Self::Move(refused) => refused.axis(),
-            Self::Unproven { axis, .. }
+            Self::StartVelocity { axis, .. }
+            | Self::Unproven { axis, .. }
             | Self::Row { axis, .. }
             | Self::SetPoint { axis, .. }
             | Self::Exceeds { axis, .. } => Some(axis),

@@ -11,9 +11,12 @@ use crate::interpolate::{AxisLimits, MoveError, PathLimits};
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::motion::MotionState;
 use crate::trajectory::path::{PathSegment, checked_lines};
+mod approach;
+mod axis_state;
 mod to_rest;
 
-use self::to_rest::{AxisState, ToRest};
+use self::axis_state::AxisState;
+use self::to_rest::ToRest;
 
 /// Start of the next move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,29 +28,28 @@ pub enum LinearSetting {
 }
 
 /// Execution of a move.
-#[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "a tick reads one of a table; boxes would scatter it"
-)]
+#[derive(Clone, Copy, Debug)]
 enum Course {
-    /// Straight, from rest to rest.
-    Straight(Line, JerkLimited),
-    /// Every axis from its current state.
-    Axes([ToRest; MAX_AXES]),
+    /// Along its line, from rest to rest.
+    Straight(JerkLimited),
+    /// Every axis from its current state; the first of them in the list of all.
+    Axes(usize),
 }
 
 #[derive(Clone, Debug)]
 struct Move {
+    line: Line,
     course: Course,
     start_s: f64,
+    programmed_s: f64,
 }
 
-/// A planned program of straight moves from rest to rest.
+/// A planned program of straight moves to rest.
 #[derive(Clone, Debug)]
 pub struct Linear {
-    moves: Box<[Move]>,
-    lines: Box<[(Line, f64)]>,
+    moves: Vec<Move>,
+    /// Motions of all axes of the moves that do not begin at rest.
+    axes: Vec<ToRest>,
     n_axes: usize,
     duration_s: f64,
     nominal_s: f64,
@@ -74,50 +76,94 @@ impl Linear {
         limits: &[AxisLimits],
         setting: LinearSetting,
     ) -> Result<Self, TrajectoryError> {
+        Self::plan_moving(start_m, &[], segments, limits, setting)
+    }
+
+    /// Plans a program that begins in motion, as [`Linear::plan`] does.
+    ///
+    /// The first move takes each axis from its velocity, without acceleration, to the target; an
+    /// axis faster than the feed slows down to it.
+    ///
+    /// # Shapes
+    /// - `start_velocity_m_s`: one entry for each coordinate of `start_m`, or none for a start at
+    ///   rest
+    /// # Real Time
+    /// Cold: allocates.
+    /// # Errors
+    /// Those of [`Linear::plan`]; [`TrajectoryError::StartVelocity`] for one beyond its limit.
+    pub fn plan_moving(
+        start_m: &[f64],
+        start_velocity_m_s: &[f64],
+        segments: &[PathSegment],
+        limits: &[AxisLimits],
+        setting: LinearSetting,
+    ) -> Result<Self, TrajectoryError> {
         let lines = checked_lines(start_m, segments, limits)?;
-        let all_limits = AxisLimits::padded(limits);
-        let mut moves: Vec<Move> = Vec::with_capacity(lines.len());
-        let mut program: Vec<(Line, f64)> = Vec::with_capacity(lines.len());
-        let (mut start_s, mut nominal_s, mut end_s) = (0.0, 0.0, 0.0_f64);
-        for (line, segment) in lines.iter().zip(segments) {
-            let now = moves.last().map(|last: &Move| state(last, start_s));
-            let resting = now.is_none_or(|axes| {
-                axes.iter()
-                    .zip(line.from_m)
-                    .all(|(axis, from_m)| *axis == AxisState { p: from_m, ..AxisState::default() })
-            });
-            let course = match now {
-                Some(axes) if !resting => {
-                    Course::Axes(together(&axes, line, &all_limits, segment.feed_m_s))
-                }
-                _ => {
-                    let along = PathLimits::along(&line.direction, limits, segment.feed_m_s);
-                    Course::Straight(*line, JerkLimited::along(line.length_m, &along)?)
-                }
+        let n_axes = start_m.len();
+        let start = starting(start_m, start_velocity_m_s, limits)?;
+        let mut plan = Self {
+            moves: Vec::with_capacity(lines.len()),
+            axes: Vec::new(),
+            n_axes,
+            duration_s: 0.0,
+            nominal_s: 0.0,
+        };
+        let mut start_s = 0.0;
+        for (index, (line, segment)) in lines.into_iter().zip(segments).enumerate() {
+            let now = if index == 0 {
+                start
+            } else if setting == LinearSetting::CompleteEveryMove {
+                resting(&line)
+            } else {
+                plan.state(start_s)
             };
-            end_s = start_s
-                + match &course {
-                    Course::Straight(_, profile) => profile.duration_s(),
-                    Course::Axes(axes) => axes.iter().map(ToRest::duration_s).fold(0.0, f64::max),
-                };
-            if !end_s.is_finite() {
-                return Err(MoveError::Duration { length: line.length_m, duration_s: end_s }.into());
+            let duration_s;
+            let course = if now == resting(&line) {
+                let along = PathLimits::along(&line.direction, limits, segment.feed_m_s);
+                let profile = JerkLimited::along(line.length_m, &along)?;
+                duration_s = profile.duration_s();
+                Course::Straight(profile)
+            } else {
+                let first = plan.axes.len();
+                duration_s = plan.add_together(&now, &line, limits, segment.feed_m_s);
+                Course::Axes(first)
+            };
+            plan.duration_s = start_s + duration_s;
+            if !plan.duration_s.is_finite() {
+                let (length, duration_s) = (line.length_m, plan.duration_s);
+                return Err(MoveError::Duration { length, duration_s }.into());
             }
-            moves.push(Move { course, start_s });
-            program.push((*line, nominal_s));
-            nominal_s += line.length_m / segment.feed_m_s;
+            let length_m = line.length_m;
+            plan.moves.push(Move { line, course, start_s, programmed_s: plan.nominal_s });
+            plan.nominal_s += length_m / segment.feed_m_s;
             start_s = match setting {
-                LinearSetting::CompleteEveryMove => end_s,
-                LinearSetting::StartOnTime => nominal_s,
+                LinearSetting::CompleteEveryMove => plan.duration_s,
+                LinearSetting::StartOnTime => plan.nominal_s,
             };
         }
-        Ok(Self {
-            moves: moves.into_boxed_slice(),
-            lines: program.into_boxed_slice(),
-            n_axes: start_m.len(),
-            duration_s: end_s,
-            nominal_s,
-        })
+        Ok(plan)
+    }
+
+    /// Plans every axis to the end of a line, all arriving with the slowest if possible, and
+    /// returns the duration.
+    fn add_together(
+        &mut self,
+        now: &[AxisState; MAX_AXES],
+        line: &Line,
+        limits: &[AxisLimits],
+        feed_m_s: f64,
+    ) -> f64 {
+        let first = self.axes.len();
+        self.axes.extend(limits.iter().enumerate().map(|(axis, limits)| {
+            let cruise_m_s = feed_m_s.min(limits.velocity_max_m_s);
+            ToRest::fastest(now[axis], line.to_m[axis], limits, cruise_m_s)
+        }));
+        let latest_s = |axes: &[ToRest]| axes.iter().map(ToRest::duration_s).fold(0.0, f64::max);
+        let slowest_s = latest_s(&self.axes[first..]);
+        for (motion, limits) in self.axes[first..].iter_mut().zip(limits) {
+            *motion = motion.slowed(limits, slowest_s);
+        }
+        latest_s(&self.axes[first..])
     }
 
     /// Duration until every axis rests.
@@ -125,21 +171,24 @@ impl Linear {
         self.duration_s
     }
 
+    /// Returns the times from the start at which the moves begin, one a move.
+    pub fn starts_s(&self) -> impl ExactSizeIterator<Item = f64> {
+        self.moves.iter().map(|planned| planned.start_s)
+    }
+
     /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.n_axes
     }
 
-    /// Returns the state at a time from the start; at rest before it and, at the last target, after
-    /// the end.
+    /// Returns the state at a time from the start: that of the start before it and, at rest at the
+    /// last target, after the end.
     ///
     /// # Real Time
     /// Hot: does not allocate.
     pub fn at(&self, t_s: f64) -> MotionState {
-        let at = self.moves.partition_point(|planned| planned.start_s <= t_s).max(1) - 1;
         let mut found = MotionState::at_rest([0.0; MAX_AXES]);
-        let Some(planned) = self.moves.get(at) else { return found };
-        for (axis, state) in state(planned, t_s.max(0.0)).into_iter().enumerate() {
+        for (axis, state) in self.state(t_s.max(0.0)).into_iter().enumerate() {
             found.position_m[axis] = state.p;
             found.velocity_m_s[axis] = state.v;
             found.acceleration_m_s2[axis] = state.a;
@@ -148,14 +197,44 @@ impl Linear {
         found
     }
 
+    /// Returns the state of every axis at a time from the start.
+    fn state(&self, t_s: f64) -> [AxisState; MAX_AXES] {
+        let mut state = [AxisState::default(); MAX_AXES];
+        let at = self.moves.partition_point(|planned| planned.start_s <= t_s).max(1) - 1;
+        let Some(planned) = self.moves.get(at) else { return state };
+        let t_s = t_s - planned.start_s;
+        match &planned.course {
+            Course::Axes(first) => {
+                for (axis, motion) in state.iter_mut().zip(&self.axes[*first..first + self.n_axes])
+                {
+                    *axis = motion.at(t_s);
+                }
+            }
+            Course::Straight(profile) => {
+                let along = profile.at(t_s);
+                let point_m = planned.line.point_m(along.s_m);
+                for (axis, state) in state.iter_mut().enumerate().take(self.n_axes) {
+                    let share = planned.line.direction[axis];
+                    *state = AxisState {
+                        p: point_m[axis],
+                        v: share * along.v_m_s,
+                        a: share * along.a_m_s2,
+                        j: share * along.j_m_s3,
+                    };
+                }
+            }
+        }
+        state
+    }
+
     /// Position of the program at a time, without limits.
     pub fn programmed_m(&self, t_s: f64) -> [f64; MAX_AXES] {
-        let at = self.lines.partition_point(|(_, start_s)| *start_s <= t_s).max(1) - 1;
-        let Some((line, start_s)) = self.lines.get(at) else { return [0.0; MAX_AXES] };
-        let end_s = self.lines.get(at + 1).map(|(_, end_s)| *end_s);
-        let duration_s = end_s.unwrap_or(self.nominal_s) - start_s;
-        let share = ((t_s - start_s) / duration_s).clamp(0.0, 1.0);
-        line.point_m(share * line.length_m)
+        let at = self.moves.partition_point(|planned| planned.programmed_s <= t_s).max(1) - 1;
+        let Some(planned) = self.moves.get(at) else { return [0.0; MAX_AXES] };
+        let end_s = self.moves.get(at + 1).map(|next| next.programmed_s);
+        let duration_s = end_s.unwrap_or(self.nominal_s) - planned.programmed_s;
+        let share = ((t_s - planned.programmed_s) / duration_s).clamp(0.0, 1.0);
+        planned.line.point_m(share * planned.line.length_m)
     }
 
     /// Duration of the program without limits.
@@ -164,40 +243,35 @@ impl Linear {
     }
 }
 
-/// Returns the state of every axis at a time of the run not before the move.
-fn state(planned: &Move, t_s: f64) -> [AxisState; MAX_AXES] {
-    let t_s = t_s - planned.start_s;
-    match &planned.course {
-        Course::Axes(axes) => std::array::from_fn(|axis| axes[axis].at(t_s)),
-        Course::Straight(line, profile) => {
-            let along = profile.at(t_s);
-            let point_m = line.point_m(along.s_m);
-            std::array::from_fn(|axis| {
-                let share = line.direction[axis];
-                AxisState {
-                    p: point_m[axis],
-                    v: share * along.v_m_s,
-                    a: share * along.a_m_s2,
-                    j: share * along.j_m_s3,
-                }
-            })
-        }
-    }
+/// Returns the state at rest at the start of a line.
+fn resting(line: &Line) -> [AxisState; MAX_AXES] {
+    line.from_m.map(|p| AxisState { p, ..AxisState::default() })
 }
 
-/// Moves every axis to the end of a line, all arriving with the slowest.
-fn together(
-    now: &[AxisState; MAX_AXES],
-    line: &Line,
-    limits: &[AxisLimits; MAX_AXES],
-    feed_m_s: f64,
-) -> [ToRest; MAX_AXES] {
-    let plan = |axis: usize, duration_s: f64| {
-        let cruise_m_s = feed_m_s.min(limits[axis].velocity_max_m_s);
-        ToRest::plan(now[axis], line.to_m[axis], &limits[axis], cruise_m_s, duration_s)
-    };
-    let slowest_s = (0..MAX_AXES).map(|axis| plan(axis, 0.0).duration_s()).fold(0.0, f64::max);
-    std::array::from_fn(|axis| plan(axis, slowest_s))
+/// Checks the start of a program, and returns its state.
+fn starting(
+    start_m: &[f64],
+    start_velocity_m_s: &[f64],
+    limits: &[AxisLimits],
+) -> Result<[AxisState; MAX_AXES], TrajectoryError> {
+    let (found, expected) = (start_velocity_m_s.len(), start_m.len());
+    if found != expected && found != 0 {
+        return Err(TrajectoryError::Shape {
+            name: "number of start velocities",
+            value: found as f64,
+            allowed: "one for each coordinate of the start, or none",
+        });
+    }
+    let mut start = [AxisState::default(); MAX_AXES];
+    for (axis, (state, p)) in start.iter_mut().zip(start_m).enumerate() {
+        let v = start_velocity_m_s.get(axis).copied().unwrap_or(0.0);
+        let limit = limits[axis].velocity_max_m_s;
+        if !(-limit..=limit).contains(&v) {
+            return Err(TrajectoryError::StartVelocity { axis, velocity: v, limit });
+        }
+        *state = AxisState { p: *p, v, ..AxisState::default() };
+    }
+    Ok(start)
 }
 
 #[cfg(test)]

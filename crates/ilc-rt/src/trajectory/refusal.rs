@@ -81,6 +81,12 @@ impl fmt::Display for Refusal<'_> {
                 "segment {}: feed {feed} {speed}: must be finite and above 0",
                 segment + 1
             ),
+            E::StartVelocity { axis, velocity, limit } => write!(
+                out,
+                "axis {}: start velocity {velocity} {unit}: must be within {limit} {unit} of 0",
+                axis + 1,
+                unit = Quantity::Velocity.unit(of_axis(axis))
+            ),
             E::ZeroLength { segment } => {
                 write!(out, "segment {}: ends where it starts: leave it out, or move", segment + 1)
             }

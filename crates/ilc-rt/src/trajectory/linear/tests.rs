@@ -1,6 +1,7 @@
 //! Properties that the two settings keep and lose.
 
 use super::*;
+use crate::interpolate::random::Random;
 use crate::trajectory::{ModulatedSegment, points_program};
 
 const LIMITS: [AxisLimits; 1] =
@@ -74,6 +75,114 @@ fn a_slow_program_is_the_same_in_both_settings_but_for_the_ramps() {
     }
     let middle = complete.at(1.4);
     assert!((middle.position_m[0] - middle.position_m[1]).abs() < 1e-15, "straight");
+}
+
+/// A random program of three axes with different limits.
+fn random_program(random: &mut Random) -> (Vec<PathSegment>, [AxisLimits; 3]) {
+    let limits = std::array::from_fn(|_| AxisLimits {
+        velocity_max_m_s: random.log(0.1, 1.0),
+        acceleration_max_m_s2: random.log(1.0, 10.0),
+        jerk_max_m_s3: random.log(20.0, 1e3),
+    });
+    let to_m = |random: &mut Random| (0..3).map(|_| 0.1 * random.signed()).collect();
+    let moves = (0..20).map(|_| PathSegment::line(to_m(random), random.log(0.02, 0.5)));
+    (moves.collect(), limits)
+}
+
+#[test]
+fn every_completed_move_is_straight_whatever_the_limits_of_its_axes() {
+    let mut random = Random(109);
+    for _ in 0..50 {
+        let (moves, limits) = random_program(&mut random);
+        let plan =
+            Linear::plan(&[0.0; 3], &moves, &limits, LinearSetting::CompleteEveryMove).unwrap();
+        let ends = plan.moves.iter().skip(1).map(|next| next.start_s).chain([plan.duration_s()]);
+        let mut from_m = vec![0.0; 3];
+        for (index, (planned, end_s)) in plan.moves.iter().zip(ends).enumerate() {
+            let to_m = &moves[index].to_m;
+            for share in [0.1, 0.3, 0.5, 0.8] {
+                let point_m =
+                    plan.at(planned.start_s + share * (end_s - planned.start_s)).position_m;
+                let along = (point_m[0] - from_m[0]) / (to_m[0] - from_m[0]);
+                for axis in 1..3 {
+                    let on_line_m = from_m[axis] + along * (to_m[axis] - from_m[axis]);
+                    assert!((point_m[axis] - on_line_m).abs() < 1e-12, "move {index} {share}");
+                }
+            }
+            from_m.clone_from(to_m);
+        }
+    }
+}
+
+#[test]
+fn no_axis_jumps_when_it_arrives() {
+    let (mut random, mut n_arrivals, h) = (Random(110), 0, 1e-9);
+    for _ in 0..500 {
+        let (moves, limits) = random_program(&mut random);
+        let plan = Linear::plan(&[0.0; 3], &moves, &limits, LinearSetting::StartOnTime).unwrap();
+        for planned in &plan.moves {
+            let Course::Axes(first) = planned.course else { continue };
+            for motion in &plan.axes[first..first + 3] {
+                let end_s = planned.start_s + motion.duration_s();
+                n_arrivals += 1;
+                let (before, after) = (plan.at(end_s - h), plan.at(end_s + h));
+                for (axis, limit) in limits.iter().enumerate() {
+                    let moved_m = after.position_m[axis] - before.position_m[axis];
+                    assert!(moved_m.abs() < 2.0 * h * limit.velocity_max_m_s * 1.001 + 1e-13);
+                }
+            }
+        }
+    }
+    assert!(n_arrivals > 10_000, "{n_arrivals}");
+}
+
+#[test]
+fn a_program_may_begin_in_motion() {
+    let limits = [LIMITS[0]; 2];
+    let moves = [PathSegment::line(vec![0.2, 0.0], 0.3), PathSegment::line(vec![0.2, 0.1], 0.3)];
+    for setting in [LinearSetting::CompleteEveryMove, LinearSetting::StartOnTime] {
+        let plan = |velocity_m_s: &[f64]| {
+            Linear::plan_moving(&[0.0, 0.05], velocity_m_s, &moves, &limits, setting)
+        };
+        let moving = plan(&[0.25, -0.1]).unwrap();
+        let start = moving.at(0.0);
+        assert_eq!(start.position_m[..2], [0.0, 0.05]);
+        assert_eq!(start.velocity_m_s[..2], [0.25, -0.1]);
+        assert_eq!(start.acceleration_m_s2[..2], [0.0, 0.0]);
+        assert_eq!(moving.at(-1.0), start);
+        assert_eq!(moving.at(moving.duration_s() + 1e-9).position_m[..2], [0.2, 0.1]);
+        let (n, mut before) = (20_000, start);
+        let h = moving.duration_s() / f64::from(n);
+        for k in 1..=n {
+            let now = moving.at(h * f64::from(k));
+            for axis in 0..2 {
+                let steps = [
+                    (now.position_m, before.position_m, 0.5),
+                    (now.velocity_m_s, before.velocity_m_s, 2.0),
+                    (now.acceleration_m_s2, before.acceleration_m_s2, 80.0),
+                ];
+                for (now, before, most) in steps {
+                    assert!((now[axis] - before[axis]).abs() <= most * h * 1.001, "{k} {axis}");
+                }
+            }
+            before = now;
+        }
+        let resting = plan(&[]).unwrap();
+        let faster = plan(&[0.25, 0.0]).unwrap();
+        assert!(faster.moves[1].start_s <= resting.moves[1].start_s, "{setting:?}");
+        for t_s in [0.0, 0.3, 0.7, 1.5] {
+            assert_eq!(plan(&[0.0, 0.0]).unwrap().at(t_s), resting.at(t_s));
+        }
+        for bad in [&[0.1][..], &[0.1, 0.0, 0.0]] {
+            assert!(matches!(plan(bad), Err(TrajectoryError::Shape { .. })), "{bad:?}");
+        }
+        for bad in [0.6, -0.6, f64::NAN, f64::INFINITY] {
+            let refused = plan(&[0.0, bad]).unwrap_err();
+            assert_eq!(refused.axis(), Some(1));
+            assert!(refused.to_string().contains("start velocity"), "{refused}");
+            assert!(refused.to_string().contains("within 0.5 m/s of 0"), "{refused}");
+        }
+    }
 }
 
 #[test]
