@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import json
-import signal
-import socket
-import subprocess
-import sys
-import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from ports_fixture import free_port
-from processes_fixture import DEADLINE_S, PATIENT, Bench, Process, goodbye
+from processes_fixture import PATIENT, Bench
+from telemetry_fixture import Watcher, endpoint, start, telemetry
 
 from ilc_rt import ReadOnlyLibrary
 from ilc_rt.events import parse_event
@@ -21,70 +16,12 @@ from ilc_rt.events import parse_event
 zenoh = pytest.importorskip("zenoh")
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from pathlib import Path
 
 pytestmark = pytest.mark.xdist_group("telemetry")
 
 RUNS = 2
-
-
-def endpoint() -> str:
-    return f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-
-
-def telemetry(*, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> str:
-    """Return the section of a cell whose telemetry stays on this computer."""
-    ends = f"listen = {json.dumps(list(listen))}\nconnect = {json.dumps(list(connect))}\n"
-    return f"\n[telemetry]\nscouting = false\n{ends}"
-
-
-class Watcher:
-    """A session that keeps everything it receives."""
-
-    def __init__(self, *, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> None:
-        config = zenoh.Config()
-        config.insert_json5("listen/endpoints", json.dumps(list(listen)))
-        config.insert_json5("connect/endpoints", json.dumps(list(connect)))
-        config.insert_json5("scouting/multicast/enabled", "false")
-        self.heard: dict[str, list[dict[str, Any]]] = {}
-        self.tokens: list[str] = []
-        self._news = threading.Condition()
-        self.session = zenoh.open(config)
-        self.session.liveliness().declare_subscriber(
-            "ilc/gantry/alive", self._on_token, history=True
-        )
-        self.session.declare_subscriber("ilc/gantry/*", self._on_value)
-
-    def _on_token(self, sample: zenoh.Sample) -> None:
-        with self._news:
-            self.tokens.append("gone" if str(sample.kind).endswith("DELETE") else "alive")
-            self._news.notify_all()
-
-    def _on_value(self, sample: zenoh.Sample) -> None:
-        with self._news:
-            key = str(sample.key_expr).rpartition("/")[2]
-            self.heard.setdefault(key, []).append(json.loads(sample.payload.to_bytes()))
-            self._news.notify_all()
-
-    def wait_for_tokens(self, *tokens: str) -> None:
-        """Wait until exactly these have arrived."""
-        with self._news:
-            assert self._news.wait_for(lambda: self.tokens == list(tokens), DEADLINE_S), self.tokens
-
-    def history_asked(self) -> list[dict[str, Any]]:
-        """Query the campaign so far."""
-        replies = self.session.get(
-            "ilc/gantry/history/*",
-            timeout=DEADLINE_S,
-            consolidation=zenoh.ConsolidationMode.NONE,
-        )
-        return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
-
-    def states_asked(self) -> list[dict[str, Any]]:
-        """Query the state, as a late joiner does."""
-        replies = self.session.get("ilc/gantry/state", timeout=DEADLINE_S)
-        return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
 
 
 class Watched:
@@ -120,14 +57,6 @@ class Watched:
                 [run[name] for name in ("reference_m", "input", "encoder_m", "tool_m")]
                 for run in runs
             ]
-
-
-def start(bench: Bench, cell: Path, *options: str, runs: int) -> Process:
-    """Start the controller with telemetry."""
-    return bench.start(
-        "ilc-rt", "run", cell, "--bus", bench.bus, "--iterations", str(runs),
-        "--library", bench.library, "--events", *options,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -314,186 +243,3 @@ def test_a_fault_is_heard(bench: Bench) -> None:
         assert watcher.heard["state"][-1]["status"] == "fault"
     finally:
         watcher.session.close()
-
-
-STOPPED_READER = """
-import json, os, signal, sys, zenoh
-config = zenoh.Config()
-config.insert_json5("listen/endpoints", json.dumps([sys.argv[1]]))
-config.insert_json5("scouting/multicast/enabled", "false")
-session = zenoh.open(config)
-def on_value(sample):
-    print("heard", flush=True)
-    os.kill(os.getpid(), signal.SIGSTOP)
-subscriber = session.declare_subscriber("ilc/**", on_value)
-print("ready", flush=True)
-signal.pause()
-"""
-
-
-def test_a_subscriber_that_stops_reading_holds_nobody_up(bench: Bench) -> None:
-    """The campaign ends meanwhile: what exceeds the network's buffers is dropped."""
-    runs = 60
-    ours = endpoint()
-    quiet = bench.cell(short=True, name="quiet.toml")
-    cell = bench.cell(short=True, more=telemetry(connect=[ours]))
-    drives = bench.drives(cell, "--lockstep")
-    assert bench.controller(quiet, "--lockstep", runs=runs).end() == 0
-    goodbye(drives)
-
-    bench.drives(cell, "--lockstep")
-    reader = subprocess.Popen(
-        [sys.executable, "-c", STOPPED_READER, ours], stdout=subprocess.PIPE, text=True
-    )
-    try:
-        assert reader.stdout is not None
-        assert reader.stdout.readline() == "ready\n"
-        controller = start(bench, cell, "--lockstep", runs=runs)
-        assert controller.end() == 0
-        assert reader.stdout.readline() == "heard\n"
-    finally:
-        reader.send_signal(signal.SIGKILL)
-        reader.wait()
-        reader.stdout.close()
-    digests = [digest for _, _, digest in bench.kept()]
-    assert digests[:runs] == digests[runs:]
-    assert len(digests) == 2 * runs
-
-
-ROUTER = """
-import json, signal, sys, zenoh
-config = zenoh.Config()
-config.insert_json5("mode", json.dumps("router"))
-config.insert_json5("listen/endpoints", json.dumps([sys.argv[1]]))
-config.insert_json5("scouting/multicast/enabled", "false")
-session = zenoh.open(config)
-subscriber = session.declare_subscriber("ilc/**", lambda sample: print("heard", flush=True))
-print("ready", flush=True)
-signal.pause()
-"""
-
-
-@pytest.mark.parametrize("last", [signal.SIGKILL, signal.SIGTERM, signal.SIGSTOP])
-def test_a_router_that_goes_takes_nothing_with_it(bench: Bench, last: signal.Signals) -> None:
-    """All telemetry goes through it, and the campaign does not depend on it."""
-    runs = 20
-    ours = endpoint()
-    quiet = bench.cell(short=True, name="quiet.toml")
-    cell = bench.cell(short=True, more=telemetry(connect=[ours]))
-    drives = bench.drives(cell, "--lockstep")
-    assert bench.controller(quiet, "--lockstep", runs=runs).end() == 0
-    goodbye(drives)
-
-    bench.drives(cell, "--lockstep")
-    router = subprocess.Popen(
-        [sys.executable, "-c", ROUTER, ours], stdout=subprocess.PIPE, text=True
-    )
-    assert router.stdout is not None
-    try:
-        assert router.stdout.readline() == "ready\n"
-        controller = start(bench, cell, "--lockstep", runs=runs)
-        assert router.stdout.readline() == "heard\n"
-        router.send_signal(last)
-        assert controller.end() == 0
-    finally:
-        router.kill()
-        router.wait()
-        router.stdout.close()
-    digests = [digest for _, _, digest in bench.kept()]
-    assert len(digests) == 2 * runs
-    assert digests[:runs] == digests[runs:]
-
-
-@pytest.mark.parametrize("wrong", ["tcp/203.0.113.7:7447", "tcp/127.0.0.1:1/nonsense", "nonsense"])
-def test_a_cell_runs_unseen_where_its_endpoint_cannot_be_opened(bench: Bench, wrong: str) -> None:
-    """A warning, and nothing more."""
-    cell = bench.cell(short=True, more=telemetry(listen=[wrong]))
-    bench.drives(cell, "--lockstep")
-    controller = start(bench, cell, "--lockstep", runs=2)
-    assert controller.end() == 0
-    (line,) = controller.errors
-    assert "[telemetry]" in line
-    assert "WARN" in line
-    assert "unseen" in line
-    assert len(bench.kept()) == 2
-
-
-def test_an_endpoint_that_is_not_there_is_waited_for_by_nobody(bench: Bench) -> None:
-    """A monitor's computer that is switched off."""
-    cell = bench.cell(short=True, more=telemetry(connect=[endpoint()]))
-    bench.drives(cell, "--lockstep")
-    controller = start(bench, cell, "--lockstep", runs=2)
-    assert controller.end(20.0) == 0
-    assert len(bench.kept()) == 2
-
-
-HOSTILE = """
-import json, os, sys, time, zenoh
-os.nice(19)
-config = zenoh.Config()
-config.insert_json5("listen/endpoints", json.dumps([sys.argv[1]]))
-config.insert_json5("scouting/multicast/enabled", "false")
-session = zenoh.open(config)
-# Its channels take one message, and it never reads: neither events, nor answers, nor queries.
-deaf = session.declare_subscriber("ilc/**", zenoh.handlers.RingChannel(1))
-mute = session.declare_queryable("ilc/gantry/heard", zenoh.handlers.RingChannel(1))
-end = b'{"event": "end", "status": "fault", "iterations": 0}'
-garbage = [b"", b"\\xff" * 60_000, b"[" * 60_000, end]
-asked = []
-told = False
-print("ready", flush=True)
-while not session.is_closed():
-    for key in ("state", "iteration", "fault", "servo", "heard", "alive", "stop"):
-        for payload in garbage:
-            session.put(f"ilc/gantry/{key}", payload)
-    asked.append(session.get("ilc/gantry/state", payload=garbage[1], timeout=60.0))
-    asked.append(session.get("ilc/**", payload=garbage[2], timeout=60.0))
-    if not told and session.info.peers_zid():
-        told = True
-        print("attacks", flush=True)
-    time.sleep(0.02)
-"""
-
-
-@pytest.mark.parametrize("pace", ["--lockstep", "--realtime"])
-def test_a_hostile_neighbour_changes_nothing_in_the_loop(bench: Bench, pace: str) -> None:
-    """Huge queries, answers never read, garbage under the cell's keys; in lock-step bit for bit.
-
-    By the clock the attacker shares the processors: a tenth of the cycles may be late by it.
-    """
-    runs = 12 if pace == "--lockstep" else 2
-    ours = endpoint()
-    more = "" if pace == "--lockstep" else PATIENT
-    options = [pace] if pace == "--lockstep" else ["--simulated-drives"]
-    figures = []
-    for name, section in (("quiet.toml", ""), ("cell.toml", telemetry(connect=[ours]))):
-        cell = bench.cell(short=True, more=more + section, name=name)
-        drives = bench.drives(cell, *(["--lockstep"] if pace == "--lockstep" else []))
-        attacker = None
-        try:
-            if section:
-                attacker = subprocess.Popen(
-                    [sys.executable, "-c", HOSTILE, ours], stdout=subprocess.PIPE, text=True
-                )
-                assert attacker.stdout is not None
-                assert attacker.stdout.readline() == "ready\n"
-                controller = start(bench, cell, *options, runs=runs)
-                assert attacker.stdout.readline() == "attacks\n"
-            else:
-                controller = bench.controller(cell, *options, runs=runs)
-            assert controller.end() == 0, controller.errors
-        finally:
-            if attacker is not None and attacker.stdout is not None:
-                attacker.kill()
-                attacker.wait()
-                attacker.stdout.close()
-        goodbye(drives)
-        figures.append([e for e in controller.events if e["event"] in {"start", "iteration"}])
-    quiet, attacked = ([e for e in one if e["event"] == "iteration"] for one in figures)
-    assert [run["index"] for run in attacked] == list(range(runs))
-    if pace == "--lockstep":
-        assert [run["digest"] for run in attacked] == [run["digest"] for run in quiet]
-    else:
-        n_cycles = runs * next(e["n_samples"] for e in figures[1] if e["event"] == "start")
-        overruns = [sum(run["overruns"] for run in one) for one in (quiet, attacked)]
-        assert overruns[1] <= overruns[0] + n_cycles // 10

@@ -4,7 +4,7 @@ Controller and drives are two processes on a bus of their own, with telemetry. I
 the time one campaign goes on without an end; in the second half the power of a drive is taken again
 and again, and the controller started again. It fails if
 
-- a stop has another cause than the drive without power, or a fault is told more than once;
+- a stop has another cause than the drive without power, or a fault is reported more than once;
 - a campaign does not go on after a fault;
 - memory, open files or threads of a process grow after the first third of its life.
 
