@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 import subprocess
 import sys
-import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from ports_fixture import free_port
-from processes_fixture import DEADLINE_S, PATIENT, Bench, Process, goodbye
+from processes_fixture import PATIENT, Bench, goodbye
+from telemetry_fixture import Watcher, endpoint, start, telemetry
 
 from ilc_rt import ReadOnlyLibrary
 from ilc_rt.events import parse_event
@@ -21,70 +19,12 @@ from ilc_rt.events import parse_event
 zenoh = pytest.importorskip("zenoh")
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from pathlib import Path
 
 pytestmark = pytest.mark.xdist_group("telemetry")
 
 RUNS = 2
-
-
-def endpoint() -> str:
-    return f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-
-
-def telemetry(*, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> str:
-    """Return the section of a cell whose telemetry stays on this computer."""
-    ends = f"listen = {json.dumps(list(listen))}\nconnect = {json.dumps(list(connect))}\n"
-    return f"\n[telemetry]\nscouting = false\n{ends}"
-
-
-class Watcher:
-    """A session that keeps everything it receives."""
-
-    def __init__(self, *, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> None:
-        config = zenoh.Config()
-        config.insert_json5("listen/endpoints", json.dumps(list(listen)))
-        config.insert_json5("connect/endpoints", json.dumps(list(connect)))
-        config.insert_json5("scouting/multicast/enabled", "false")
-        self.heard: dict[str, list[dict[str, Any]]] = {}
-        self.tokens: list[str] = []
-        self._news = threading.Condition()
-        self.session = zenoh.open(config)
-        self.session.liveliness().declare_subscriber(
-            "ilc/gantry/alive", self._on_token, history=True
-        )
-        self.session.declare_subscriber("ilc/gantry/*", self._on_value)
-
-    def _on_token(self, sample: zenoh.Sample) -> None:
-        with self._news:
-            self.tokens.append("gone" if str(sample.kind).endswith("DELETE") else "alive")
-            self._news.notify_all()
-
-    def _on_value(self, sample: zenoh.Sample) -> None:
-        with self._news:
-            key = str(sample.key_expr).rpartition("/")[2]
-            self.heard.setdefault(key, []).append(json.loads(sample.payload.to_bytes()))
-            self._news.notify_all()
-
-    def wait_for_tokens(self, *tokens: str) -> None:
-        """Wait until exactly these have arrived."""
-        with self._news:
-            assert self._news.wait_for(lambda: self.tokens == list(tokens), DEADLINE_S), self.tokens
-
-    def history_asked(self) -> list[dict[str, Any]]:
-        """Query the campaign so far."""
-        replies = self.session.get(
-            "ilc/gantry/history/*",
-            timeout=DEADLINE_S,
-            consolidation=zenoh.ConsolidationMode.NONE,
-        )
-        return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
-
-    def states_asked(self) -> list[dict[str, Any]]:
-        """Query the state, as a late joiner does."""
-        replies = self.session.get("ilc/gantry/state", timeout=DEADLINE_S)
-        return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
 
 
 class Watched:
@@ -120,14 +60,6 @@ class Watched:
                 [run[name] for name in ("reference_m", "input", "encoder_m", "tool_m")]
                 for run in runs
             ]
-
-
-def start(bench: Bench, cell: Path, *options: str, runs: int) -> Process:
-    """Start the controller with telemetry."""
-    return bench.start(
-        "ilc-rt", "run", cell, "--bus", bench.bus, "--iterations", str(runs),
-        "--library", bench.library, "--events", *options,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -194,91 +126,6 @@ def test_servo_batches_are_the_samples_of_the_runs(watched: Watched) -> None:
                     np.testing.assert_array_equal(array[row], kept[k])
                 n_seen += 1
     assert n_seen == sum(len(row[0]) for row in watched.rows)
-
-
-SIX = """\
-[cell]
-name = "gantry"
-cycle_us = 1000
-
-[bus]
-address = "loopback:"
-{axes}
-[program]
-start_m = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-feed_m_s = 0.1
-corner = "exact_stop"
-
-[[program.segment]]
-to_m = [0.05, 0.04, 0.03, 0.02, 0.01, 0.05]
-
-[learning]
-law = "pd"
-measure = "encoder"
-input_max_m = 0.005
-
-[learning.pd]
-kp = 0.5
-kd = 0.0
-"""
-AXIS = """
-[[axis]]
-name = "a{node}"
-node = {node}
-interface = "csp"
-counts_per_m = 1e8
-
-[axis.limits]
-position_min_m = -0.02
-position_max_m = 0.10
-velocity_max_m_s = 0.5
-acceleration_max_m_s2 = 8.0
-jerk_max_m_s3 = 1000.0
-following_error_max_m = 0.05
-
-[axis.model]
-natural_frequency_hz = 15.0
-damping = 1.0
-delay_samples = 3
-
-[axis.simulation]
-mass_kg = {node}.0
-natural_frequency_hz = 15.0
-damping = 1.0
-"""
-
-
-def test_no_sample_of_six_axes_at_1_khz_is_lost_on_one_host(bench: Bench) -> None:
-    """Every cycle from the first to the last of every run, as it is in the library."""
-    ours = endpoint()
-    axes = "".join(AXIS.format(node=node) for node in range(1, 7))
-    cell = bench.folder / "six.toml"
-    cell.write_text(SIX.format(axes=axes) + PATIENT + telemetry(connect=[ours]))
-    watcher = Watcher(listen=[ours])
-    try:
-        bench.drives(cell)
-        controller = start(bench, cell, "--simulated-drives", runs=RUNS)
-        assert controller.end() == 0, controller.errors
-        watcher.wait_for_tokens("alive", "gone")
-        batches = watcher.heard["servo"]
-    finally:
-        watcher.session.close()
-    firsts = [batch["first_sync"] for batch in batches]
-    assert firsts == list(range(0, 50 * len(batches), 50))
-    assert {len(row) for batch in batches for row in batch["encoder_m"]} == {6}
-    library = ReadOnlyLibrary(bench.library)
-    runs = [library.load(run["id"]) for run in library]
-    assert len(runs) == RUNS
-    heard = {
-        tuple(place): row
-        for batch in batches
-        for place, row in zip(batch["iteration_and_sample"], batch["encoder_m"], strict=True)
-        if place is not None
-    }
-    assert len(heard) == sum(len(run["encoder_m"]) for run in runs)
-    for number, run in enumerate(runs):
-        rows = [heard[number, k] for k in range(len(run["encoder_m"]))]
-        np.testing.assert_array_equal(np.array(rows, dtype=float), run["encoder_m"])
 
 
 def test_a_late_joiner_gets_the_state(watched: Watched) -> None:
