@@ -25,6 +25,7 @@ from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import SCHEMA, EventError, StartEvent, parse_event
 from ilc_rt.misfit import misfit
+from ilc_rt.patience import Patience
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -122,6 +123,8 @@ class Monitor(Closing):
         self._cell = checked_name(cell)
         self._queue: queue.Queue[Message] = queue.Queue(QUEUE_MAX)
         self._lost = 0
+        # A stranger may come and go, and never answer: others are heard meanwhile.
+        self._patience = Patience()
         # Messages of the past that may still arrive once more.
         self._past: list[Message] = []
         if router and not connect:
@@ -156,10 +159,12 @@ class Monitor(Closing):
                 self._past.remove(replace(message, is_past=True))
                 continue
             yield message
-            if message.topic == "alive":
-                self._past = self.ask_history(message.cell)
+            if message.topic == "alive" and self._patience.is_left:
+                with self._patience.spent():
+                    self._past = self.ask_history(message.cell)
+                    states = self.ask_state(message.cell)
                 yield from self._past
-                yield from self.ask_state(message.cell)
+                yield from states
 
     def ask_history(self, cell: str | None = None) -> list[Message]:
         """Query the start of the campaign that is running, its runs and faults, oldest first.

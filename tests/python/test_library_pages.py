@@ -86,6 +86,15 @@ def test_wide_letters_keep_the_columns(ilc: Callable[..., object], tmp_path: Pat
     assert narrow.index(" pd ") == wide.index(" pd ") + 2
 
 
+def test_two_long_names_share_the_width(ilc: Callable[..., object], tmp_path: Path) -> None:
+    library = Library(tmp_path / "l.db")
+    library.append(np.zeros(2), np.ones(2), 0.01, cell="c" * 200, law="l" * 90, campaign="a")
+    (row,) = (line for line in ilc("library", "list", "l.db").stdout.splitlines() if "cc" in line)
+    assert len(row) <= 140
+    assert abs(row.count("c") - row.count("l")) <= 1
+    assert row.count("l") > 20
+
+
 def test_a_reader_creates_and_changes_nothing(library: Library, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"none\.db: no such library"):
         ReadOnlyLibrary(tmp_path / "none.db")

@@ -16,6 +16,7 @@ from rich.console import Console
 from ilc_rt import Cell
 from ilc_rt.events import EndEvent, IterationEvent, StartEvent, StateEvent, parse_event
 from ilc_rt.monitor import Message, Monitor
+from ilc_rt.patience import Patience
 from ilc_rt.result import micrometres
 from ilc_rt.sources import Memory
 from ilc_rt.watched import WatchedCell
@@ -125,6 +126,41 @@ def test_answers_without_end_are_cut(publisher: Publisher, monkeypatch: pytest.M
         assert len(monitor.ask_history()) == 300
         monkeypatch.setattr("ilc_rt.monitor.REPLIES_MAX", 100)
         assert len(monitor.ask_history()) == 100
+
+
+def test_a_stranger_that_never_answers_takes_no_more_than_its_share(
+    publisher: Publisher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It comes and goes; what others publish is heard, as if it were not there."""
+    now_s = [0.0]
+    asked: list[str] = []
+
+    def ask(cell: str) -> list[Message]:
+        asked.append(cell)
+        now_s[0] += 2.0
+        return []
+
+    with Monitor("*", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert next(messages).cell == "gantry"
+        monkeypatch.setattr(monitor, "_patience", Patience(lambda: now_s[0]))
+        monkeypatch.setattr(monitor, "ask_history", ask)
+        monkeypatch.setattr(monitor, "ask_state", ask)
+        for _ in range(40):
+            monitor._put(Message("mute", "alive", {}))
+        monitor._put(Message("gantry", "state", STATE, parse_event(json.dumps(STATE))))
+        heard = [next(message for message in messages if message.topic == "state")]
+        while heard[-1].is_past:
+            heard.append(next(messages))
+        assert heard[-1].cell == "gantry"
+        assert 10 <= len(asked) <= 16
+        # After a while it is asked again.
+        now_s[0] += 100.0
+        monitor._put(Message("mute", "alive", {}))
+        monitor._put(Message("gantry", "fault", {}))
+        n_before = len(asked)
+        assert next(message for message in messages if message.topic == "fault").cell == "gantry"
+        assert len(asked) == n_before + 2
 
 
 def test_every_answer_of_a_controller_is_heard() -> None:

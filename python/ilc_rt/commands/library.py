@@ -160,12 +160,12 @@ def _lines(rows: list[dict[str, Any]], width: int) -> list[str]:
         max([len(name), *(cell_len(text[column]) for text in texts)])
         for column, name in enumerate(names)
     ]
-    # Names are shortened, the longest first; columns are a blank apart.
-    excess = sum(wanted) + len(names) + 1 - width
-    for column in sorted(SHORTENED, key=lambda column: -wanted[column]):
-        cut = max(0, min(excess, wanted[column] - SHORTENED[column]))
-        wanted[column] -= cut
-        excess -= cut
+    # Names are shortened, always the longest; columns are a blank apart.
+    for _ in range(sum(wanted) + len(names) + 1 - width):
+        longer = [column for column, least in SHORTENED.items() if wanted[column] > least]
+        if not longer:
+            break
+        wanted[max(longer, key=wanted.__getitem__)] -= 1
     is_right = [name in RIGHT for name in names]
 
     def line(text: Sequence[str]) -> str:
