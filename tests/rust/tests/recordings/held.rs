@@ -38,11 +38,11 @@ impl Pipe {
     }
 }
 
-/// What a campaign in real time left that was recorded by a held writer.
+/// A campaign in real time that was recorded by a held writer.
 struct Held {
     path: PathBuf,
     outcome: Outcome,
-    /// Records lost when a loss was told, each time.
+    /// Number of lost records in each report.
     told: Vec<u64>,
     /// Runs that had ended when the writer was released.
     ended_before: usize,
