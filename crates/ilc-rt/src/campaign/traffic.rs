@@ -10,6 +10,7 @@ use crate::config::Cell;
 use crate::fieldbus::Frame;
 use crate::fieldbus::frame::PAYLOAD_MAX;
 use crate::fieldbus::transport::BusEvent;
+use crate::record::{TEXT_MAX, printable};
 use crate::recording::{Item, Reader, RecordingError, Traffic, read_event};
 
 /// Name of the interface of a cell that is not on a CAN interface.
@@ -73,6 +74,7 @@ pub fn export(path: &Path, format: TrafficFormat, to: &Path) -> Result<u64, Reco
                 // What was refused was not on the bus.
                 Some(BusEvent::Refused(..) | BusEvent::Failed(_)) => continue,
                 None => {
+                    let text = printable(text, TEXT_MAX);
                     let what = format!("cycle {}: `{text}` is no frame", frames.cycle);
                     return Err(RecordingError::NotARecording { path: path.to_owned(), what });
                 }

@@ -15,7 +15,7 @@ use super::message::{AxisMessage, CycleMessage, FramesMessage, TableMessage, Tim
 use super::records::Records;
 use super::setup::{LoopSetup, VERSION};
 use crate::config::Cell;
-use crate::record::fingerprint;
+use crate::record::{TEXT_MAX, fingerprint, printable};
 
 /// An item of a recording, with its time since the epoch in ns where it has one.
 #[derive(Clone, Debug)]
@@ -90,8 +90,9 @@ impl<R: Read> Reader<R> {
         self.n_lost
     }
 
-    fn damaged(&self, what: impl Into<String>) -> RecordingError {
-        RecordingError::NotARecording { path: self.path.clone(), what: what.into() }
+    fn damaged(&self, what: impl AsRef<str>) -> RecordingError {
+        let what = printable(what.as_ref(), TEXT_MAX);
+        RecordingError::NotARecording { path: self.path.clone(), what }
     }
 
     /// Returns the next item; `None` at the end.

@@ -214,6 +214,9 @@ fn what_was_changed_by_hand_is_refused() {
     // The cell description, with its checksum and without.
     let edited = changed(&path, |data| swap(data, b"position_max_m = 0", b"position_max_m = 1"));
     assert!(said(&edited).contains("its cell description was changed"), "{}", said(&edited));
+    // A text that is no frame, with letters that no terminal may get.
+    let odd = changed(&path, in_cycle(3, "sent", |frames| frames[0] = "201#\u{7f}\u{1b}".into()));
+    assert!(said(&odd).ends_with("cycle 3: `201#\\x7f\\x1b` is no frame"), "{}", said(&odd));
     // A byte in a chunk, with its checksum.
     let mut bytes = std::fs::read(&path).unwrap();
     assert!(swap(&mut bytes, b"\"cycle\":3,", b"\"Cycle\":3,"));

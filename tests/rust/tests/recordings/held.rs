@@ -42,7 +42,7 @@ impl Pipe {
 struct Held {
     path: PathBuf,
     outcome: Outcome,
-    /// Records lost at each report of a loss.
+    /// Number of lost records in each report.
     told: Vec<u64>,
     /// Runs that had ended when the writer was released.
     ended_before: usize,

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::design::DesignError;
 use crate::fieldbus::cia402::MapError;
+use crate::record::{TEXT_MAX, printable};
 use crate::recording::{AxisMessage, CycleMessage, FramesMessage, Item, Reader, RecordingError};
 use player::Player;
 
@@ -111,8 +112,9 @@ pub fn replay_read<R: Read>(mut reader: Reader<R>, path: &Path) -> Result<Replay
     let mut player: Option<Player> = None;
     let mut tick = Tick::default();
     let mut lost_at = None;
-    let contradiction =
-        |what: String| ReplayError::Contradiction { what: format!("{}: {what}", path.display()) };
+    let contradiction = |what: String| ReplayError::Contradiction {
+        what: format!("{}: {}", path.display(), printable(&what, TEXT_MAX)),
+    };
     while let Some(item) = reader.next_item()? {
         match item {
             Item::Loop(parts) => {

@@ -17,6 +17,7 @@ use crate::fieldbus::cia402::PdoMap;
 use crate::fieldbus::frame::FD_PAYLOAD_MAX;
 use crate::fieldbus::transport::{BusEvent, TapCount};
 use crate::interpolate::MAX_AXES;
+use crate::record::{NAME_MAX, printable};
 use crate::recording::{
     AxisMessage, CycleMessage, LoopSetup, TableMessage, Traffic, column_digest, read_event,
 };
@@ -64,7 +65,7 @@ impl Player {
         if digest(&plan.reference_m) != setup.set_points_digest {
             return Err(ReplayError::OtherSetPoints {
                 this: env!("CARGO_PKG_VERSION"),
-                then: setup.program_version,
+                then: printable(&setup.program_version, NAME_MAX),
             });
         }
         let maps: Vec<PdoMap> =
