@@ -24,6 +24,7 @@ __all__ = [
     "Line",
     "Made",
     "ModelError",
+    "MovePlan",
     "Pid",
     "SignalError",
     "StateSpace",

@@ -28,7 +28,7 @@ def jerk_limited(
     """Plan straight moves with jerk-limited (S-curve) axes.
 
     Seven phases of constant jerk per move. `setting` selects one of the two ways in which machine
-    tools join moves.
+    tools join moves. `MovePlan` is the same motion without samples.
 
     Parameters
     ----------

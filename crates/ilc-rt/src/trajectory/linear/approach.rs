@@ -122,14 +122,14 @@ impl Approach {
             let slope = -(ramps.first.peak + ramps.last.peak) / (2.0 * self.jerk) - cruise_s;
             (late <= 0.0 && left >= 0.0, cruise - late / slope)
         };
-        let found = narrowed(fastest, 0.0, arrives(fastest).1, arrives);
-        let lower = found.next_down();
+        let within = |fast: f64| narrowed(fast, 0.0, arrives(fast).1, 8.0 * f64::EPSILON, arrives);
+        let (found, lower) = within(fastest);
         if self.eased <= 0.0 || self.left(&self.ramps(lower)) >= 0.0 {
             return found;
         }
         // Slightly slower cruises go too far; those below another root do not.
         let slow = self.reaching(0.0, lower, 0.5 * lower);
-        if arrives(slow).0 { narrowed(slow, 0.0, arrives(slow).1, arrives) } else { found }
+        if arrives(slow).0 { within(slow).0 } else { found }
     }
 
     /// Returns duration and jerk of the seven phases: the cruise lasts for what the ramps leave.
@@ -149,13 +149,14 @@ impl Approach {
     /// Returns the velocity next to the root in an interval at whose lower end the ramps do not go
     /// too far, and do at its upper one.
     fn reaching(&self, below: f64, above: f64, guess: f64) -> f64 {
-        narrowed(below, above, guess, |cruise| {
+        let (found, _) = narrowed(below, above, guess, 0.0, |cruise| {
             let ramps = self.ramps(cruise);
             let Ramp { sign, peak, .. } = ramps.first;
             let slope = sign * cruise / peak + peak / (2.0 * self.jerk) + ramps.last_slope;
             let left = self.left(&ramps);
             (left >= 0.0, cruise + left / slope)
-        })
+        });
+        found
     }
 
     /// Approaches the root above the eased velocity, where the first ramp accelerates.
@@ -232,8 +233,8 @@ impl Ramps {
     }
 }
 
-/// Narrows an interval until its ends are neighbouring numbers, and returns the end at which the
-/// test is true.
+/// Narrows an interval to a share of its ends, for 0 until they are neighbouring numbers, and
+/// returns first the end at which the test is true.
 ///
 /// The test also returns Newton's next value; near the root that value is moved across it, so that
 /// both ends close in. A value outside the interval is replaced by its middle.
@@ -241,16 +242,17 @@ fn narrowed(
     mut inside: f64,
     mut outside: f64,
     guess: f64,
+    share: f64,
     test: impl Fn(f64) -> (bool, f64),
-) -> f64 {
+) -> (f64, f64) {
     let mut next = guess;
     for step in 0..STEPS {
         let is_between = |at: f64| inside.min(outside) < at && at < inside.max(outside);
         if !is_between(next) || (step > NEWTON_STEPS && step % 2 == 0) {
             next = 0.5 * (inside + outside);
-            if !is_between(next) {
-                break;
-            }
+        }
+        if !is_between(next) || (inside - outside).abs() <= share * inside.abs() {
+            break;
         }
         let (is_inside, newton) = test(next);
         let end = if is_inside { &mut inside } else { &mut outside };
@@ -258,5 +260,5 @@ fn narrowed(
         let other = if is_inside { outside } else { inside };
         next = newton + (2.0 * f64::EPSILON * newton.abs()).copysign(other - newton);
     }
-    inside
+    (inside, outside)
 }
