@@ -108,6 +108,12 @@ impl Line {
         self.rows.len() / self.nodes.len()
     }
 
+    /// Forgets the commands and positions so far, and keeps their memory.
+    pub fn forget(&mut self) {
+        self.rows.clear();
+        self.plant_m.clear();
+    }
+
     fn note(&mut self, frame: &Frame) {
         for (axis, node) in self.nodes.iter().enumerate() {
             if let Some(command) = CommandRpdo1::decode(frame, *node) {
@@ -342,13 +348,6 @@ impl Rig {
             stop,
             count,
         }
-    }
-
-    /// Forgets what the loop has reported so far, and keeps the memory of it.
-    pub fn forget(&mut self) {
-        let mut line = self.tap.line();
-        (line.rows.clear(), line.plant_m.clear());
-        (self.samples.clear(), self.started.clear(), self.ended.clear());
     }
 
     /// Requests a stop of the loop, as a signal does.

@@ -12,7 +12,6 @@ use std::time::Duration;
 use rusqlite::{Connection, OpenFlags};
 
 use super::error::LibraryError;
-use super::reader::look;
 use super::schema::{self, ARRAYS, COLUMNS};
 use crate::record::figure_fields;
 
@@ -33,20 +32,7 @@ pub(super) enum Found {
     Library(i64),
 }
 
-/// Inspects a path without changing anything.
-///
-/// # Errors
-/// [`LibraryError::Foreign`] for a file that is not a library; [`LibraryError::Version`] for one of
-/// a later version; [`LibraryError::Open`] if it cannot be read.
-pub(super) fn inspect(path: &Path) -> Result<Found, LibraryError> {
-    let Some(metadata) = metadata(path)? else { return Ok(Found::Nothing) };
-    if metadata.len() == 0 {
-        return Ok(Found::Nothing);
-    }
-    look(path).map(|look| look.found)
-}
-
-/// Opens a file for writing, creating it if it is missing. To be called after [`inspect`].
+/// Opens a file for writing, creating it if it is missing. To be called after it was inspected.
 ///
 /// # Errors
 /// [`LibraryError::Open`] or [`LibraryError::ReadOnly`].

@@ -50,6 +50,19 @@ pub(super) struct Reader {
     pub(super) at_rest: Option<AtRest>,
 }
 
+/// Inspects a path without changing anything.
+///
+/// # Errors
+/// [`LibraryError::Foreign`] for a file that is not a library; [`LibraryError::Version`] for one of
+/// a later version; [`LibraryError::Open`] if it cannot be read.
+pub(super) fn inspect(path: &Path) -> Result<Found, LibraryError> {
+    let Some(metadata) = metadata(path)? else { return Ok(Found::Nothing) };
+    if metadata.len() == 0 {
+        return Ok(Found::Nothing);
+    }
+    look(path).map(|look| look.found)
+}
+
 /// Opens a library read-only; leaves no trace beside it.
 ///
 /// # Errors

@@ -45,7 +45,7 @@ impl Library {
         if path.as_os_str() == file::IN_MEMORY {
             return Self::in_memory();
         }
-        let found = file::inspect(path)?;
+        let found = reader::inspect(path)?;
         let connection = file::writer(path)?;
         let name = path.display().to_string();
         let fail = |source: rusqlite::Error| match told(&name, source) {
