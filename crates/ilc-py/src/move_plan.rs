@@ -28,7 +28,6 @@ pub(crate) struct PyMovePlan {
 #[pymethods]
 impl PyMovePlan {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "by position, the typed class is Python's")]
     fn new(
         points_m: &Bound<'_, PyAny>,
         feed_m_s: &Bound<'_, PyAny>,
