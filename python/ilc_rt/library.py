@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import builtins
     from collections.abc import Callable, Iterator
 
+    Progress = Callable[[int, int], object]
+
     from numpy.typing import ArrayLike
     from typing_extensions import Self
 
@@ -338,7 +340,7 @@ class Library(Closing, _native.Library):
         """
         return super()._append(**given(locals()))
 
-    def trim(self, keep: int, cell: str | None = None) -> int:
+    def trim(self, keep: int, cell: str | None = None, *, progress: Progress | None = None) -> int:
         """Delete all but the most relevant runs, and return how many were deleted.
 
         Parameters
@@ -347,6 +349,8 @@ class Library(Closing, _native.Library):
             Number of runs to keep.
         cell : str or None
             Only among runs of the cell of this name.
+        progress : callable or None
+            As of `retain`.
 
         Returns
         -------
@@ -356,16 +360,14 @@ class Library(Closing, _native.Library):
         Raises
         ------
         OSError
-            If the file cannot be written or shrunk, or the runs have different numbers of
-            disturbances (then nothing is deleted).
+            As of `retain`; if runs have different numbers of disturbances, nothing is deleted.
 
         Notes
         -----
         The relevance of DPW-ILC, with RMS error and disturbance scaled by their spread over these
-        runs and summed over all their disturbances; without disturbances the runs with the smallest
-        errors are kept. The file shrinks.
+        runs and summed over all their disturbances; without disturbances the smallest errors stay.
         """
-        return super().trim(keep, cell)
+        return self._delete(self._least_relevant(keep, cell), progress)
 
     def retain(
         self,
@@ -374,7 +376,7 @@ class Library(Closing, _native.Library):
         days: float | None = None,
         best: int | None = None,
         cell: str | None = None,
-        progress: Callable[[int, int], object] | None = None,
+        progress: Progress | None = None,
     ) -> int:
         """Delete all runs that no rule keeps, and return how many were deleted.
 
@@ -410,15 +412,20 @@ class Library(Closing, _native.Library):
         Notes
         -----
         Oldest first, a thousand in one transaction: a campaign that stores a run meanwhile does not
-        wait for all of them. After an interruption the rest stays, and the same call goes on.
+        wait for all of them. Then the file shrinks. After an interruption the rest stays, and the
+        same call goes on.
         """
         runs = self.list(cell)
         kept = kept_by(runs, newest=newest, days=days, best=best)
-        gone = [run["id"] for run in runs if run["id"] not in kept]
+        return self._delete([run["id"] for run in runs if run["id"] not in kept], progress)
+
+    def _delete(self, gone: list[int], progress: Progress | None) -> int:
         for first in range(0, len(gone), DELETED_AT_ONCE):
             if progress is not None:
                 progress(first, len(gone))
             self._remove(gone[first : first + DELETED_AT_ONCE])
+        if gone:
+            self._shrink(len(gone))
         return len(gone)
 
     def export(self, id: int, path: str | PathLike[str]) -> None:

@@ -99,10 +99,15 @@ impl PyLibrary {
         inserted.or_raise()?.map_err(|Raised(error)| error)
     }
 
-    /// Delete runs in one transaction, and return their space to the system.
+    /// Delete runs in one transaction.
     fn _remove(&self, py: Python<'_>, ids: &Bound<'_, PyAny>) -> PyResult<()> {
         let ids: Vec<i64> = ids.extract()?;
-        detached(py, || self.write(|library| library.discard(&ids))).or_raise()
+        detached(py, || self.write(|library| library.remove(&ids))).or_raise()
+    }
+
+    /// Return the space of deleted runs to the system.
+    fn _shrink(&self, py: Python<'_>, n_deleted: usize) -> PyResult<()> {
+        detached(py, || self.write(|library| library.shrink(n_deleted))).or_raise()
     }
 
     /// Return a run with its arrays.
@@ -179,15 +184,15 @@ impl PyLibrary {
         detached(py, || self.write(|library| library.append_next(&meta, record))).or_raise()
     }
 
-    /// Delete all but the most relevant runs, and return how many were deleted.
-    fn trim(
+    /// Return the keys of all but the most relevant runs.
+    fn _least_relevant(
         &self,
         py: Python<'_>,
         keep: &Bound<'_, PyAny>,
         cell: Option<String>,
-    ) -> PyResult<usize> {
+    ) -> PyResult<Vec<i64>> {
         let (task, keep) = (Task { cell }, whole::whole("keep", keep)?);
-        detached(py, || self.write(|library| library.trim(keep, &task))).or_raise()
+        detached(py, || self.read(|library| library.least_relevant(keep, &task))).or_raise()
     }
 }
 

@@ -265,8 +265,7 @@ def trim(
     try:
         with Steps("runs deleted") as steps:
             if keep is not None:
-                with steps.clocked(f"weighing {n_runs} runs and deleting the least relevant"):
-                    deleted = Library(str(library)).trim(min(keep, n_runs), cell)
+                deleted = Library(str(library)).trim(min(keep, n_runs), cell, progress=steps.tell)
             else:
                 deleted = Library(str(library)).retain(
                     newest=newest, days=days, best=best, cell=cell, progress=steps.tell

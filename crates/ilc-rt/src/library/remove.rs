@@ -29,23 +29,28 @@ impl Library {
     /// Deletes these runs, all or none, and returns their space to the system.
     ///
     /// # Errors
-    /// As [`Library::remove`]; [`LibraryError::NotShrunk`] if the runs are deleted, but their space
-    /// cannot be returned.
+    /// As [`Library::remove`] and [`Library::shrink`].
     pub fn discard(&self, ids: &[i64]) -> Result<(), LibraryError> {
-        self.transact::<(), LibraryError>(|connection| {
-            let all = delete(connection, ids).and_then(|()| once::forget_descriptions(connection));
-            all.map_err(|source| self.fail(source))
+        self.remove(ids)?;
+        self.shrink(ids.len())
+    }
+
+    /// Returns the space of `n_deleted` runs, and of what was kept for them alone, to the system.
+    ///
+    /// # Errors
+    /// [`LibraryError::Locked`], [`LibraryError::Sqlite`] or [`LibraryError::NotShrunk`]: the runs are
+    /// deleted, but their space cannot be returned.
+    pub fn shrink(&self, n_deleted: usize) -> Result<(), LibraryError> {
+        self.transact(|connection| {
+            once::forget_descriptions(connection).map_err(|source| self.fail(source))
         })?;
-        self.shrink().map_err(|source| LibraryError::NotShrunk {
-            path: self.path.clone(),
-            n_deleted: ids.len(),
-            source,
-        })
+        let path = || self.path.clone();
+        self.vacuum().map_err(|source| LibraryError::NotShrunk { path: path(), n_deleted, source })
     }
 
     /// Returns the pages of deleted runs to the system. The remaining runs are never at risk:
     /// SQLite changes the file in transactions, and an interrupted one is undone.
-    fn shrink(&self) -> rusqlite::Result<()> {
+    fn vacuum(&self) -> rusqlite::Result<()> {
         let is_whole = self.pragma("auto_vacuum")? == 0;
         let n_free = self.pragma("freelist_count")?;
         let n_kept = self.pragma("page_count")? - n_free;

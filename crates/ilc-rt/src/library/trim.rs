@@ -21,6 +21,18 @@ impl Library {
     /// Deletes all runs of a task except the `keep` most relevant ones, and returns the number of
     /// deleted runs.
     ///
+    /// # Errors
+    /// As [`Library::least_relevant`] and [`Library::discard`].
+    pub fn trim(&self, keep: usize, task: &Task) -> Result<usize, LibraryError> {
+        let gone = self.least_relevant(keep, task)?;
+        if !gone.is_empty() {
+            self.discard(&gone)?;
+        }
+        Ok(gone.len())
+    }
+
+    /// Returns all runs of a task except the `keep` most relevant ones, the oldest first.
+    ///
     /// A run's relevance under a disturbance is that of DPW-ILC,
     /// `1 / (E_j + |d - d_j|^2 + epsilon)`, with the square of its RMS error and each disturbance
     /// in units of their mean and variance over these runs, and `epsilon` = 1e-6. Its share is the
@@ -31,14 +43,13 @@ impl Library {
     ///
     /// # Errors
     /// [`LibraryError::Disturbances`] if runs have different numbers of disturbances;
-    /// [`LibraryError::Sqlite`] if the file cannot be written: nothing is deleted then;
-    /// [`LibraryError::NotShrunk`] if the runs are deleted, but their space cannot be returned.
+    /// [`LibraryError::Sqlite`] if the file cannot be read.
     /// # Source
     /// - \[dimarco2016\], Eq. (4.12), (4.13), and Sec. 5.1: trimming as future work.
-    pub fn trim(&self, keep: usize, task: &Task) -> Result<usize, LibraryError> {
+    pub fn least_relevant(&self, keep: usize, task: &Task) -> Result<Vec<i64>, LibraryError> {
         let runs = self.candidates(task)?;
         if runs.len() <= keep {
-            return Ok(0);
+            return Ok(Vec::new());
         }
         let width = runs[0].disturbance.len();
         if let Some(other) = runs.iter().find(|run| run.disturbance.len() != width) {
@@ -65,10 +76,8 @@ impl Library {
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(b.cmp(&a)));
         let kept: HashSet<usize> = order.into_iter().take(keep).collect();
-        let gone = (0..runs.len()).filter(|number| !kept.contains(number)).map(|n| runs[n].id);
-        let gone: Vec<i64> = gone.collect();
-        self.discard(&gone)?;
-        Ok(gone.len())
+        let gone = (0..runs.len()).filter(|number| !kept.contains(number));
+        Ok(gone.map(|number| runs[number].id).collect())
     }
 
     fn candidates(&self, task: &Task) -> Result<Vec<Candidate>, LibraryError> {
