@@ -96,9 +96,9 @@ def test_the_page_of_a_machine_has_every_section_with_its_figures(tmp_path):
     assert "Written by `make rt-page` on " in text
     head, *sections = text.split("\n## ")
     assert " processors, kernel " in head
-    titles = ["Wake-ups at 1 kHz", "Ticks", "Findings of `ilc-rt doctor`"]
+    titles = ["Wake-ups at 1 kHz", "Ticks", "A tick on UDP", "Findings of `ilc-rt doctor`"]
     assert [section.partition("\n")[0] for section in sections] == titles
-    wake, ticks, findings = map(rows_of, sections)
+    wake, ticks, stages, findings = map(rows_of, sections)
     # Idle, then loaded.
     assert [row[0] for row in wake] == ["median", "99 %", "99.9 %", "longest"] * 2
     for table in (wake[:4], wake[4:]):
@@ -114,6 +114,8 @@ def test_the_page_of_a_machine_has_every_section_with_its_figures(tmp_path):
         assert tick_us == sorted(tick_us)
         assert tick_us[0] > 0.0
         assert int(row[6]) > 0
+    assert len(stages) == 5
+    assert all(0.0 < float(row[1]) <= float(row[2]) for row in stages[1:])
     assert {row[0] for row in findings} >= {"kernel", "priority", "memory", "clock"}
     assert {row[1] for row in findings} <= {"good", "poor", "unknown"}
 
@@ -122,4 +124,4 @@ def rows_of(section):
     """Return the cells of the tables of a section, without their headings."""
     lines = [line for line in section.splitlines() if line.startswith("| ")]
     rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
-    return [row for row in rows if row[0] not in {"us", "cell", "what"}]
+    return [row for row in rows if row[0] not in {"us", "cell", "stage", "what"}]
