@@ -18,7 +18,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from report import processor
+from processor import processor
 
 ROOT = Path(__file__).resolve().parent.parent
 SECONDS = os.environ.get("RT_SECONDS") or "20"

@@ -17,6 +17,7 @@ import bounded
 import moves
 import prediction
 import update
+from processor import processor
 
 ROOT = Path(__file__).resolve().parent.parent
 BORDER = (1300, 30_000, 100_000)
@@ -204,14 +205,6 @@ def readable(seconds: float) -> str:
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"
     return f"{seconds * 1e9:.3g} ns"
-
-
-def processor() -> str:
-    """Return the name of the processor."""
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        if line.startswith("model name"):
-            return line.split(":", 1)[1].strip()
-    return platform.machine()
 
 
 def command(*words: str) -> str:
