@@ -419,7 +419,7 @@ class Library(Closing, _native.Library):
         kept = kept_by(runs, newest=newest, days=days, best=best)
         return self._delete([run["id"] for run in runs if run["id"] not in kept], progress)
 
-    def _delete(self, gone: list[int], progress: Progress | None) -> int:
+    def _delete(self, gone: builtins.list[int], progress: Progress | None) -> int:
         for first in range(0, len(gone), DELETED_AT_ONCE):
             if progress is not None:
                 progress(first, len(gone))
