@@ -147,7 +147,7 @@ signal.signal(signal.SIGXFSZ, signal.SIG_DFL if is_killed else signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 try:
-    Library(path).trim(2**31)
+    Library(path)._shrink(0)
 except OSError as error:
     sys.exit(str(error))
 """
