@@ -147,7 +147,7 @@ signal.signal(signal.SIGXFSZ, signal.SIG_DFL if is_killed else signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 try:
-    Library(path)._shrink(0)
+    Library(path)._remove([])
 except OSError as error:
     sys.exit(str(error))
 """
