@@ -21,6 +21,7 @@ from ilc_rt import (
     repeatability,
     second_order,
     signal,
+    trajectory,
     weights,
 )
 
@@ -53,6 +54,12 @@ def test_fifteen_hundred_drawn_calls_break_no_rule():
         (lambda: identify.frequency_response(np.ones(64), np.ones(64), 0.1,
                                              segment_samples=2**31), "at least 8, and no more"),
         (lambda: weights.schedule([(0, 1.0)], 2**32), "n_samples = 4294967296"),
+        (lambda: trajectory.exponential_sigmoid(
+            [[0.0, 0.0], [0.1, 0.0]], feed_m_s=1e-200, dt_s=0.002, velocity_max_m_s=0.5,
+            acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0), "samples: allowed 10000000"),
+        (lambda: weights.formation(10**7, 1, 60), "n_agents \\* n_axes = 10000000; at most 256"),
+        (lambda: weights.formation(1, 10**7, 60), "n_agents \\* n_axes = 10000000; at most 256"),
+        (lambda: weights.formation(2**31, 2**31, 1), "; at most 256"),
     ],
 )  # fmt: skip
 def test_sizes_are_bounded_before_memory_is_asked_for(call, words):

@@ -26,7 +26,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this computer"),
-    pytest.mark.xdist_group("dashboard"),
+    pytest.mark.xdist_group("odd dashboard"),
     pytest.mark.timeout(300),
 ]
 

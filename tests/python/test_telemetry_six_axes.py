@@ -14,7 +14,7 @@ from ilc_rt import ReadOnlyLibrary
 if TYPE_CHECKING:
     from pathlib import Path
 
-pytestmark = pytest.mark.xdist_group("telemetry")
+pytestmark = pytest.mark.xdist_group("six axes")
 
 RUNS = 2
 SIX = """\

@@ -128,6 +128,8 @@ pub(crate) fn read_formation_weight(
 }
 
 fn read_formation(a: Arguments<'_, '_>, n_agents: usize, n_axes: usize) -> PyResult<Formation> {
+    // Before a list as long as they say.
+    Formation::check_size(n_agents, n_axes).or_raise()?;
     let pairs = a.maybe_pairs("pairs")?.unwrap_or_else(|| Formation::all_pairs(n_agents));
     let axes = a.maybe_wholes("axes")?.unwrap_or_else(|| (0..n_axes).collect());
     Formation::of_pairs(n_agents, n_axes, &pairs, &axes).or_raise()

@@ -5,6 +5,11 @@ use nalgebra::DMatrix;
 use super::{Objective, Weight};
 use crate::learning::{LearningError, Result};
 
+/// Most channels of all agents together.
+const CHANNELS_MAX: usize = 256;
+/// Most entries of `F`: half a gigabyte.
+const ENTRIES_MAX: usize = 1 << 26;
+
 /// The agents, and the maps from their errors to formation errors and to the centre's error.
 ///
 /// An agent is a machine, or a group of axes, with its own reference. The errors of all agents are
@@ -32,8 +37,9 @@ impl Formation {
     /// Creates a formation of equal agents in which every pair keeps its offset in every axis.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] for 0 agents or axes.
+    /// - [`LearningError::Empty`] or [`LearningError::TooMany`], as [`Formation::check_size`].
     pub fn new(n_agents: usize, n_axes: usize) -> Result<Self> {
+        Self::check_size(n_agents, n_axes)?;
         let axes: Vec<usize> = (0..n_axes).collect();
         Self::of_pairs(n_agents, n_axes, &Self::all_pairs(n_agents), &axes)
     }
@@ -45,7 +51,8 @@ impl Formation {
     /// the agents.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] for 0 agents or axes.
+    /// - [`LearningError::Empty`] or [`LearningError::TooMany`], as [`Formation::check_size`], the latter
+    ///   for too many pairs and axes, too.
     /// - [`LearningError::Weight`] for an agent or axis that does not exist, or a pair of equal
     ///   agents.
     pub fn of_pairs(
@@ -54,10 +61,11 @@ impl Formation {
         pairs: &[(usize, usize)],
         axes: &[usize],
     ) -> Result<Self> {
-        for (what, count) in [("n_agents", n_agents), ("n_axes", n_axes)] {
-            if count == 0 {
-                return Err(LearningError::Empty { what });
-            }
+        Self::check_size(n_agents, n_axes)?;
+        let (value, allowed) =
+            (axes.len().saturating_mul(pairs.len()), ENTRIES_MAX / (n_agents * n_axes));
+        if value > allowed {
+            return Err(LearningError::TooMany { what: "pairs * axes", value, allowed });
         }
         for (i, j) in pairs {
             if i == j || *i.max(j) >= n_agents {
@@ -81,6 +89,24 @@ impl Formation {
             if col % n_axes == row { share } else { 0.0 }
         });
         Ok(Self { n_agents, n_axes, shape, centre })
+    }
+
+    /// Ensures that a formation has agents and axes, and not too many for memory.
+    ///
+    /// # Errors
+    /// - [`LearningError::Empty`] for 0 agents or axes.
+    /// - [`LearningError::TooMany`] for more than 256 channels of all agents together.
+    pub fn check_size(n_agents: usize, n_axes: usize) -> Result {
+        for (what, count) in [("n_agents", n_agents), ("n_axes", n_axes)] {
+            if count == 0 {
+                return Err(LearningError::Empty { what });
+            }
+        }
+        let (value, allowed) = (n_agents.saturating_mul(n_axes), CHANNELS_MAX);
+        if value > allowed {
+            return Err(LearningError::TooMany { what: "n_agents * n_axes", value, allowed });
+        }
+        Ok(())
     }
 
     /// Returns every pair of agents, neighbours in number first.
@@ -259,6 +285,16 @@ mod tests {
         assert!(told(&[(0, 1)], &[2]).contains("axis 2"));
         assert!(Formation::new(0, 2).unwrap_err().to_string().contains("n_agents"));
         assert!(Formation::new(2, 0).unwrap_err().to_string().contains("n_axes"));
+        for (n_agents, n_axes) in
+            [(257, 1), (1, 257), (10_000_000, 1), (1, usize::MAX), (2, usize::MAX)]
+        {
+            let line = Formation::new(n_agents, n_axes).unwrap_err().to_string();
+            assert!(line.contains("at most 256"), "{line}");
+        }
+        assert_eq!(Formation::new(16, 16).unwrap().shape().ncols(), 256);
+        let axes = vec![0; 1 << 20];
+        let line = Formation::of_pairs(64, 4, &Formation::all_pairs(64), &axes).unwrap_err();
+        assert!(line.to_string().contains("at most 262144"), "{line}");
         let good = Formation::new(2, 2).unwrap();
         let narrow = good.clone().with_centre(DMatrix::zeros(2, 3)).unwrap_err();
         assert!(narrow.to_string().contains("3 columns"));

@@ -14,6 +14,8 @@ use crate::trajectory::error::TrajectoryError;
 
 /// Scan points per decade of α.
 const PER_DECADE: f64 = 12.0;
+/// Most scan points: those of all numbers.
+const POINTS_MAX: f64 = 7600.0;
 /// A maximum of the scan is refined above this.
 const NEAR: f64 = 0.9;
 /// Golden-section steps of a minimum or maximum.
@@ -62,12 +64,13 @@ impl Place<'_> {
             });
         }
         let largest = self.largest().max(1.001 * smallest).min(self.alpha_max);
-        let n_points = ((largest / smallest).log10() * PER_DECADE).ceil().max(4.0);
+        // Numbers so far apart that their ratio is infinite scan nothing.
+        let n_points = ((largest / smallest).log10() * PER_DECADE).ceil().clamp(4.0, POINTS_MAX);
         let step = (largest / smallest).powf(1.0 / n_points);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a few hundred at most: powers of 10 of finite numbers"
+            reason = "within the least and the most points"
         )]
         let alphas: Vec<f64> = (0..=n_points as usize)
             .map(|i| (smallest * step.powf(i as f64)).min(largest))

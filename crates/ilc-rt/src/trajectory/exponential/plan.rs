@@ -8,6 +8,7 @@ use crate::interpolate::limits::is_positive;
 use crate::interpolate::line::Line;
 use crate::interpolate::{AxisLimits, MoveError, PathLimits, Quantity};
 use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::grid::{CYCLE_S, n_ticks};
 use crate::trajectory::motion::MotionState;
 use crate::trajectory::path::{PathSegment, checked_lines};
 
@@ -193,6 +194,8 @@ fn placed(
         if !(duration_s.is_finite() && duration_s > 0.0) {
             return Err(MoveError::Duration { length: line.length_m, duration_s }.into());
         }
+        // No run of any cycle lasts so long.
+        n_ticks(duration_s, CYCLE_S.1)?;
         let mut leg = Leg {
             feed_m_s: segment.feed_m_s,
             amplitude_m: segment.amplitude_m,
