@@ -12,7 +12,7 @@ from ports_fixture import free_port
 from processes_fixture import DEADLINE_S
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from processes_fixture import Bench, Process
@@ -28,6 +28,11 @@ def telemetry(*, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> str
     return f"\n[telemetry]\nscouting = false\n{ends}"
 
 
+def direct(callback: Callable[[Any], object]) -> zenoh.handlers.Callback:
+    """Let a callback run in the order of arrival: by default each has a thread of its own."""
+    return zenoh.handlers.Callback(callback, indirect=False)
+
+
 class Watcher:
     """A session that keeps everything it receives."""
 
@@ -41,9 +46,13 @@ class Watcher:
         self._news = threading.Condition()
         self.session = zenoh.open(config)
         self.session.liveliness().declare_subscriber(
-            "ilc/gantry/alive", self._on_token, history=True
+            "ilc/gantry/alive", direct(self._on_token), history=True
         )
-        self.session.declare_subscriber("ilc/gantry/*", self._on_value)
+        self.session.declare_subscriber("ilc/gantry/*", direct(self._on_value))
+        # The controller waits for the answer, which comes after what was sent before.
+        self.session.declare_queryable(
+            "ilc/gantry/heard", direct(lambda query: query.reply(query.key_expr, b""))
+        )
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         with self._news:
