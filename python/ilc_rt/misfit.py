@@ -6,6 +6,7 @@ counted and drawn.
 
 from __future__ import annotations
 
+import functools
 import math
 import types
 import typing
@@ -34,7 +35,8 @@ def misfit(event: object) -> str | None:
     >>> misfit(StateEvent("running", 2**60)), misfit(StateEvent("running", 3))
     ('iteration = 1152921504606846976 is not of its type or range', None)
     """
-    hints = typing.get_type_hints(type(event))
+    kind: type = type(event)
+    hints = _hints(kind)
     for field in fields(event):  # type: ignore[arg-type]
         value = getattr(event, field.name)
         if is_dataclass(value):
@@ -44,6 +46,11 @@ def misfit(event: object) -> str | None:
         elif not _fits(value, hints[field.name]):
             return f"{field.name} = {_shown(value)} is not of its type or range"
     return _misfit_of_start(event) if isinstance(event, StartEvent) else None
+
+
+@functools.cache
+def _hints(kind: type) -> dict[str, object]:
+    return typing.get_type_hints(kind)
 
 
 def _misfit_of_start(start: StartEvent) -> str | None:
