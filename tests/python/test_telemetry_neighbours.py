@@ -164,7 +164,7 @@ while not session.is_closed():
 
 
 def attacked(bench: Bench, pace: str, runs: int) -> list[list[dict[str, Any]]]:
-    """Return start and runs of a campaign by itself, and of one with an attacker beside it."""
+    """Return the start and iteration events of an undisturbed campaign, and of one under attack."""
     ours = endpoint()
     is_lockstep = pace == "--lockstep"
     options = [pace] if is_lockstep else ["--simulated-drives"]
