@@ -57,6 +57,8 @@ def test_fifteen_hundred_drawn_calls_break_no_rule():
         (lambda: trajectory.exponential_sigmoid(
             [[0.0, 0.0], [0.1, 0.0]], feed_m_s=1e-200, dt_s=0.002, velocity_max_m_s=0.5,
             acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0), "samples: allowed 10000000"),
+        (lambda: identify.fit_rational(np.arange(1.0, 81.0), np.exp(-1j * np.arange(80.0) / 50),
+                                       n_zeros=1, n_poles=2, delay_s=1e308), "a million periods"),
         (lambda: weights.formation(10**7, 1, 60), "n_agents \\* n_axes = 10000000; at most 256"),
         (lambda: weights.formation(1, 10**7, 60), "n_agents \\* n_axes = 10000000; at most 256"),
         (lambda: weights.formation(2**31, 2**31, 1), "; at most 256"),

@@ -67,16 +67,13 @@ pub fn fit_rational(
         let allowed = "a proper model has no more zeros than poles";
         return Err(ModelError::Parameter { what: "n_zeros", value: n_zeros as f64, allowed });
     }
-    if !delay_s.is_finite() {
-        let allowed = "it must be finite";
-        return Err(ModelError::Parameter { what: "delay_s", value: delay_s, allowed });
-    }
     if let Some(dt_s) = dt_s
         && !(dt_s.is_finite() && dt_s > 0.0)
     {
         return Err(ModelError::SampleTime { dt_s });
     }
     measured.check(n_zeros + n_poles + 1)?;
+    measured.check_delay(delay_s)?;
     let measured = &measured.answered();
     measured.check(n_zeros + n_poles + 1)?;
     let mut best = fit_degrees(measured, (n_zeros, n_poles), delay_s, dt_s);

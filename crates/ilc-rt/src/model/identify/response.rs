@@ -9,6 +9,8 @@ use crate::model::ModelError;
 const EXCITED: f64 = 1e-16;
 /// Coherence above which an estimate counts as perfect; remaining differences are the model's.
 const COHERENCE_MAX: f64 = 0.9999;
+/// Most turns of a known delay at the highest frequency: beyond, its phase is rounding.
+const TURNS_MAX: f64 = 1e6;
 
 /// A measured frequency response.
 ///
@@ -111,6 +113,21 @@ impl FrequencyResponse {
             coherence: pick(&self.coherence),
             n_averages: self.n_averages,
         }
+    }
+
+    /// Ensures that the phase of a known delay is a number at every frequency.
+    ///
+    /// # Errors
+    /// - [`ModelError::Parameter`] beyond a million turns.
+    pub(super) fn check_delay(&self, delay_s: f64) -> Result<(), ModelError> {
+        let highest_hz = self.frequency_hz.iter().copied().fold(0.0, f64::max);
+        // False for a number that is not finite.
+        if delay_s.abs() * highest_hz <= TURNS_MAX {
+            return Ok(());
+        }
+        let allowed =
+            "a known delay must be finite, and at most a million periods of the highest frequency";
+        Err(ModelError::Parameter { what: "delay_s", value: delay_s, allowed })
     }
 
     /// Returns the part with a non-zero response: a response of 0 has no logarithm.

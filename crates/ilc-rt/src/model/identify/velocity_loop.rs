@@ -75,10 +75,8 @@ pub fn fit_velocity_loop(
         let allowed = "it must be finite and greater than 0 1/s";
         return Err(refused("position_gain_per_s", kv, allowed));
     }
-    if let Some(value) = delay_s.filter(|delay_s| !delay_s.is_finite()) {
-        return Err(refused("delay_s", value, "a known delay must be finite"));
-    }
     measured.check(3)?;
+    delay_s.map_or(Ok(()), |delay_s| measured.check_delay(delay_s))?;
     let answered = measured.answered();
     if 2 * answered.frequency_hz.len() <= 3 {
         let model = VelocityLoop {

@@ -72,8 +72,8 @@ pub fn fit_second_order(
     {
         return Err(ModelError::SampleTime { dt_s });
     }
-    check_known(known)?;
     measured.check(4)?;
+    check_known(measured, known)?;
     let answered = measured.answered();
     if 2 * answered.frequency_hz.len() <= 4 {
         return Ok(SecondOrderFit::of_silence(measured, dt_s, known));
@@ -136,17 +136,12 @@ impl SecondOrderFit {
     }
 }
 
-fn check_known(known: Known) -> Result<(), ModelError> {
-    let bad = |value: f64| !value.is_finite();
-    if let Some(value) = known.gain.filter(|gain| bad(*gain) || *gain == 0.0) {
+fn check_known(measured: &FrequencyResponse, known: Known) -> Result<(), ModelError> {
+    if let Some(value) = known.gain.filter(|gain| !gain.is_finite() || *gain == 0.0) {
         let allowed = "a known gain must be finite and not 0";
         return Err(ModelError::Parameter { what: "gain", value, allowed });
     }
-    if let Some(value) = known.delay_s.filter(|delay_s| bad(*delay_s)) {
-        let allowed = "a known delay must be finite";
-        return Err(ModelError::Parameter { what: "delay_s", value, allowed });
-    }
-    Ok(())
+    known.delay_s.map_or(Ok(()), |delay_s| measured.check_delay(delay_s))
 }
 
 /// Problem of the fit. Parameters: `ln w0`, `ln delta`, then `ln |K|` and
