@@ -88,8 +88,8 @@ class Hunt:
         """Draw new problems for every property test, repeatedly."""
         names = property_tests()
         seed = self.seed
-        rounds = 0
-        while time.monotonic() < until and not self.failed:
+        rounds, before = 0, len(self.failed)
+        while time.monotonic() < until and len(self.failed) == before:
             self.run(
                 "property tests in Rust",
                 [*CARGO, "--lib", "--tests", "--quiet", "--", *names],

@@ -3,7 +3,7 @@
 //! The guidelines s1 to s4 of \[barton2010\], Sec. 3.3.4, as a procedure that states the reason for
 //! every step; the command line and the Python bindings import it.
 
-use super::analysis::{Analysis, Question, Spectrum, Uncertainty, analyze};
+use super::analysis::{Analysis, Question, Spectrum, Uncertainty, analyze, check_length};
 use super::error::check;
 use super::law::norm_optimal::{NormOptimal, Weights};
 use super::{Law, LearningError, Result};
@@ -102,6 +102,7 @@ pub fn tune(model: &StateSpace, n_samples: usize, knowledge: &Knowledge) -> Resu
         let (what, value, allowed) = ("n_runs", knowledge.n_runs, RUNS_MAX);
         return Err(LearningError::TooMany { what, value, allowed });
     }
+    check_length(model, n_samples)?;
     if let Some(uncertainty) = &knowledge.uncertainty {
         uncertainty.check()?;
     }

@@ -15,6 +15,18 @@ const ADJOINT: f64 = 1e-6;
 /// Largest number of inputs that is analysed: beyond it the analysis takes minutes.
 const INPUTS_MAX: usize = 1_000_000;
 
+/// Refuses an empty run, and one whose analysis would take minutes.
+pub(in crate::learning) fn check_length(model: &StateSpace, n_samples: usize) -> Result {
+    let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+    check_counts(&[("n_samples", n_samples), ("n_inputs", n_inputs), ("n_outputs", n_outputs)])?;
+    let allowed = INPUTS_MAX / n_inputs.max(n_outputs);
+    if n_samples > allowed {
+        let what = "n_samples of an analysis";
+        return Err(LearningError::TooMany { what, value: n_samples, allowed });
+    }
+    Ok(())
+}
+
 /// Replacement for zero in [`lift`].
 pub(super) const FLOOR: f64 = 1e-60;
 
@@ -54,16 +66,7 @@ impl<'a> Iteration<'a> {
     pub(super) fn new(law: &'a mut dyn Law, model: &StateSpace, n_samples: usize) -> Result<Self> {
         let plant = Plant::new(model)?;
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
-        check_counts(&[
-            ("n_samples", n_samples),
-            ("n_inputs", n_inputs),
-            ("n_outputs", n_outputs),
-        ])?;
-        let allowed = INPUTS_MAX / n_inputs.max(n_outputs);
-        if n_samples > allowed {
-            let what = "n_samples of an analysis";
-            return Err(LearningError::TooMany { what, value: n_samples, allowed });
-        }
+        check_length(model, n_samples)?;
         let hessian = match law.structure() {
             Structure::Optimal { model: own, weights: Some(weights) } => {
                 Some(Hessian::new(own, model, n_samples, weights)?)

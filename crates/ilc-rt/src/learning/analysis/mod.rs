@@ -33,6 +33,7 @@ pub use columns::COLUMNS_MAX;
 pub use condition::PdCondition;
 pub use figures::{Analysis, Method};
 pub(in crate::learning) use frequency::Spectrum;
+pub(in crate::learning) use iteration::check_length;
 pub use overreach::{Overreach, overreach};
 pub use question::{DENSE_MAX, Question, analyze};
 pub use refuse::{Verdict, divergence, refuse_divergent};
