@@ -23,7 +23,7 @@ NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak trials check fmt lint docs bench rt instructions rt-page deb vcan clean
+.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak trials check fmt lint docs bench rt instructions rtsan rt-page deb vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -141,6 +141,13 @@ rt: build ## What is promised of the tick: no allocation, exact repetition; and 
 
 instructions: $(VENV)/.built ## Instructions of a tick by callgrind (Debian: valgrind), beside the stored figures
 	$(BIN)/python benchmarks/instructions.py
+
+# The sanitizer belongs to the compiler, but its switch is not stable yet. Build scripts must not be built
+# with it, hence --target.
+rtsan: ## The tick under LLVM's RealtimeSanitizer: no allocation, lock, sleep or system call
+	RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=realtime --cfg rtsan" CARGO_PROFILE_RELEASE_OPT_LEVEL=1 \
+	CARGO_TARGET_DIR=$(abspath $(TARGET))/rtsan \
+	  cargo test --release --package ilc-tests --test no_alloc --target $$(rustc --print host-tuple)
 
 rt-page: build ## Measure this computer's punctuality, RT_SECONDS (20) a part, and write its page into docs/machines
 	$(BIN)/python benchmarks/machine_page.py

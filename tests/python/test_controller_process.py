@@ -225,6 +225,7 @@ def test_latency_is_measured_under_load_and_drawn(bench: Bench) -> None:
             # None is the loop's own; the system may move a page now and then.
             assert part["minor_faults"] <= part["wake_late_us"]["count"] // 100
             assert part["major_faults"] == 0
+        assert part["sleepless_us"]["count"] > 0
         if part["cyclictest_us"] is not None:
             assert part["cyclictest_us"]["count"] > 0
 

@@ -4,7 +4,8 @@
 //! [`campaign`] runs a campaign as a user does; [`far_side`] puts the simulated machine on a bus in
 //! a thread of its own; [`rig`] is the loop alone, on a bus that records every command and lets a test
 //! break things in the middle of a run; [`faulty`] is a bus that loses, delays and spoils frames by seed;
-//! [`catalogue`] builds every law; [`counting`] is an allocator that counts; [`source`] reads the project's own source.
+//! [`catalogue`] builds every law; [`counting`] is an allocator that counts;
+//! [`nonblocking`] marks what a sanitizer watches; [`source`] reads the project's own source.
 
 #![expect(clippy::expect_used, reason = "a test fails where its set-up does")]
 
@@ -14,6 +15,7 @@ pub mod counting;
 pub mod derived;
 pub mod far_side;
 pub mod faulty;
+pub mod nonblocking;
 pub mod rig;
 pub mod source;
 

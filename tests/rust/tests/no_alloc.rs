@@ -19,6 +19,7 @@ use ilc_rt::fieldbus::transport::Responder;
 use ilc_rt::rt::{Clock, MonotonicClock, Nanos};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::counting::{Counting, allocations, deallocations, live_bytes};
+use ilc_tests::nonblocking::nonblocking;
 use ilc_tests::rig::{Rig, node, write_object};
 use ilc_tests::short;
 
@@ -54,9 +55,11 @@ impl Watched {
         let n_syncs = self.rig.tap.line().n_syncs();
         let before = (allocations(), deallocations());
         let due = self.clock.now();
-        self.rig.cycle.begin(due, due, missed);
-        let status = self.rig.cycle.tick(missed);
-        let recorded = self.rig.cycle.end();
+        let cycle = &mut self.rig.cycle;
+        let (status, recorded) = nonblocking(|| {
+            cycle.begin(due, due, missed);
+            (cycle.tick(missed), cycle.end())
+        });
         let after = (allocations(), deallocations());
         assert!(recorded.is_some_and(|stamps| stamps.late && stamps.ended > due));
         self.rig.read_mail(n_syncs);
@@ -129,6 +132,27 @@ fn whole_campaigns_with_swapped_tables() {
         assert_eq!(watched.phases, BTreeSet::from(expected));
         println!("{name}: {} ticks", watched.n_ticks);
     }
+}
+
+/// The sanitizer of `make rtsan` stops a program that allocates where it must not.
+#[cfg(rtsan)]
+#[test]
+fn the_sanitizer_finds_an_allocation() {
+    let program = std::env::current_exe().unwrap();
+    let planted = std::process::Command::new(program)
+        .args(["--exact", "a_planted_allocation", "--ignored"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&planted.stderr);
+    assert!(!planted.status.success() && said.contains("RealtimeSanitizer"), "{said}");
+    assert!(said.contains("malloc"), "{said}");
+}
+
+#[cfg(rtsan)]
+#[test]
+#[ignore = "it is stopped by the sanitizer"]
+fn a_planted_allocation() {
+    nonblocking(|| drop(std::hint::black_box(Box::new(1))));
 }
 
 /// Five hours and a half of the gantry. `make soak` makes them.

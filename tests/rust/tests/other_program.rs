@@ -8,9 +8,11 @@
 
 use std::path::Path;
 
-use ilc_rt::campaign::input::Source;
+use ilc_rt::campaign::input::{Source, take_over};
 use ilc_rt::campaign::{self, CampaignError, Options, Outcome};
 use ilc_rt::config::{Cell, LawName};
+use ilc_rt::design::Plan;
+use ilc_rt::learning::{Law, LearningError};
 use ilc_rt::library::Library;
 use ilc_rt::record::EndStatus;
 use ilc_tests::campaign::{in_process, options};
@@ -128,6 +130,56 @@ fn parameters_of_the_cell_description_count_from_the_first_run_on_and_learning_m
         line.contains("the parameters of the law") && line.contains("allowed: up to"),
         "{line}"
     );
+}
+
+/// A law that refuses what another run shows: at once, or when it has to begin with it.
+struct Refusing {
+    at_once: bool,
+}
+
+impl Refusing {
+    fn refusal<T>() -> Result<T, LearningError> {
+        Err(LearningError::Empty { what: "basis" })
+    }
+}
+
+impl Law for Refusing {
+    fn update(&mut self, _: &[f64], _: &[f64], _: &mut [f64]) -> Result<(), LearningError> {
+        Self::refusal()
+    }
+
+    fn take_over(&mut self, _: &[f64], _: &[f64]) -> Result<bool, LearningError> {
+        if self.at_once { Self::refusal() } else { Ok(true) }
+    }
+
+    fn first_input(&mut self) -> Result<Option<Vec<f64>>, LearningError> {
+        Self::refusal()
+    }
+
+    fn reset(&mut self) {}
+
+    fn describe(&self) -> String {
+        "{}".to_owned()
+    }
+}
+
+#[test]
+fn a_law_that_refuses_the_parameters_of_a_run_says_why_and_does_not_begin_with_zero() {
+    let scratch = Scratch::new();
+    let path = scratch.file("a.db");
+    run(&gantry(BASIS, false), &options(path.clone(), 1)).unwrap();
+    let library = Library::open(&path).unwrap();
+    let other = gantry(BASIS, true);
+    let plan = Plan::new(&other, None, true).unwrap();
+    for at_once in [true, false] {
+        let mut law = Refusing { at_once };
+        let taken =
+            take_over(&library, "a.db", Source::Last, (&other, &plan), Some(&mut law), |_| false);
+        let line = taken.unwrap().unwrap_err().to_string();
+        let reason = LearningError::Empty { what: "basis" }.to_string();
+        assert!(line.starts_with("library a.db: run 1 has no parameters for the law"), "{line}");
+        assert!(line.ends_with(&reason), "{line}");
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Refusals of a learned input, in one line that names the value and what is allowed.
 
+use crate::learning::LearningError;
+
 /// Reason that an input is not used, or not exported.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InputError {
@@ -37,6 +39,16 @@ pub enum InputError {
     Unparametric {
         /// The law of the cell.
         law: String,
+    },
+    /// The law refuses what a run shows.
+    #[error("{place} has no parameters for the law \"{law}\": {source}")]
+    Refused {
+        /// The run.
+        place: String,
+        /// The law of the cell.
+        law: String,
+        /// Its reason.
+        source: Box<LearningError>,
     },
     /// The input was learned for something else.
     #[error("{place}: {key} is {there} there and {here} in this cell; allowed: the same")]

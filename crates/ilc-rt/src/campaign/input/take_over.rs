@@ -70,12 +70,21 @@ pub fn take_over(
     }
     // The run was stored whole, so that its signals have one row per sample.
     let reference_m = &row.record.reference_m;
-    if !matches!(law.take_over(reference_m, &row.record.input), Ok(true)) {
-        return Ok(Err(InputError::Unparametric { law: name }));
-    }
+    let input = match law.take_over(reference_m, &row.record.input) {
+        Ok(false) => return Ok(Err(InputError::Unparametric { law: name })),
+        Ok(true) => law.first_input(),
+        Err(source) => Err(source),
+    };
+    let input = match input {
+        Ok(input) => input,
+        Err(source) => {
+            let source = Box::new(source);
+            return Ok(Err(InputError::Refused { place, law: name, source }));
+        }
+    };
     let (index, campaign) = (row.record.index, &row.meta.campaign);
     tracing::info!("the law begins with the parameters of run {index} of campaign {campaign}");
-    let Ok(Some(input)) = law.first_input() else { return Ok(Ok(None)) };
+    let Some(input) = input else { return Ok(Ok(None)) };
     let bounds = plan.input_bounds();
     let place = format!("parameters of {place}");
     Ok(task.require_bounds(&input, &bounds, &place).map(|()| Some(input)))

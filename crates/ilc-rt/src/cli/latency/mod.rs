@@ -20,8 +20,11 @@ use crate::rt::{
 };
 use crate::servo::{Cycle, Timing, run_until};
 
-/// Turns that the loop and `cyclictest` take.
+/// Turns that the loop, `cyclictest` and the loop that hardly sleeps take.
 const TURNS: u32 = 5;
+/// Share of a cycle that the loop that hardly sleeps busy-waits, in percent: below the share that the kernel
+/// allows to real-time threads (95 by default).
+const SLEEPLESS_PERCENT: u64 = 90;
 /// Largest wake-up lateness of each grade, in microseconds; the usage is that of LinuxCNC's latency test.
 const GRADES: [(f64, &str); 3] = [
     (20.0, "excellent: fit for any drive"),
@@ -45,7 +48,8 @@ pub(super) struct LatencyArguments {
     /// Cycle to keep; that of the cell, or 1000, if not given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(50..=100_000))]
     cycle_us: Option<u32>,
-    /// Duration of the measurement; cyclictest, where it is installed, takes as long in turns with the loop.
+    /// Duration of the measurement; in turns with it cyclictest, where it is installed, and a loop that hardly sleeps,
+    /// as late as the computer itself makes it, take as long.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     seconds: u32,
     /// Busy-wait the last microseconds before each deadline; that of the cell, or as long as the wake-ups are measured
@@ -103,17 +107,16 @@ pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
                 if granted.is_none() {
                     tell_settings(&report, arguments.seconds);
                 }
-                let (timing, peer) =
-                    measure(&mut cycle, *clock, cycle_us, arguments.seconds, request);
-                (report, timing, peer)
+                let measured = measure(&mut cycle, *clock, cycle_us, arguments.seconds, request);
+                (report, measured)
             });
             measuring.join()
         });
         drop(load);
-        let Ok((report, timing, peer)) = measured else { return EXIT_FAILURE };
+        let Ok((report, measured)) = measured else { return EXIT_FAILURE };
         show::say(&format!("{name}:"));
-        tell(&timing, peer.as_ref(), arguments.histogram);
-        let part = part(&timing, peer.as_ref());
+        tell(&measured, arguments.histogram);
+        let part = part(&measured);
         if *name == "loaded" {
             text["loaded"] = part;
         } else if let (Some(all), Value::Object(part)) = (text.as_object_mut(), part) {
@@ -128,23 +131,36 @@ pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
     }
 }
 
-/// Lets the loop and `cyclictest` take turns.
+/// What was measured in turns.
+struct Measured {
+    timing: Timing,
+    /// Wake-ups of `cyclictest`, if it is installed.
+    peer: Option<PeerFigures>,
+    /// Wake-ups of the loop that hardly sleeps: what the kernel, the firmware or a host takes from any program.
+    sleepless: LatencyFigures,
+}
+
+/// Lets the loop, `cyclictest` and the loop that hardly sleeps take turns.
 fn measure(
     cycle: &mut Cycle,
     clock: MonotonicClock,
     cycle_us: u32,
     seconds: u32,
     request: RtRequest,
-) -> (Timing, Option<PeerFigures>) {
+) -> Measured {
     let n_turns = TURNS.min(seconds);
     let (mut timing, mut peer, mut is_there) = (Timing::default(), Peer::default(), true);
+    let awake = Nanos(u64::from(cycle_us) * 1000 * SLEEPLESS_PERCENT / 100);
+    let (sleepless_clock, mut sleepless) = (MonotonicClock::new(awake), Timing::default());
     for turn in 0..n_turns {
         let turn_s = seconds / n_turns + u32::from(turn < seconds % n_turns);
-        let end = clock.now().plus(Nanos(u64::from(turn_s) * 1_000_000_000));
-        run_until(cycle, &clock, &mut timing, end);
+        let end = || clock.now().plus(Nanos(u64::from(turn_s) * 1_000_000_000));
+        run_until(cycle, &clock, &mut timing, end());
         is_there = is_there && peer.measure(cycle_us, turn_s, request.priority);
+        run_until(cycle, &sleepless_clock, &mut sleepless, end());
     }
-    (timing, is_there.then(|| peer.figures()))
+    let peer = is_there.then(|| peer.figures());
+    Measured { timing, peer, sleepless: sleepless.wake_late.figures() }
 }
 
 fn tell_settings(report: &RtReport, seconds: u32) {
@@ -161,7 +177,8 @@ fn tell_settings(report: &RtReport, seconds: u32) {
     }
 }
 
-fn tell(timing: &Timing, peer: Option<&PeerFigures>, with_histogram: bool) {
+fn tell(measured: &Measured, with_histogram: bool) {
+    let Measured { timing, peer, sleepless } = measured;
     let figures = timing.wake_late.figures();
     show::say(&format!(
         "woke late by at most {:.1} us; 99.9 % {:.1}, 99 % {:.1}, median {:.1}; {} wake-ups",
@@ -174,6 +191,11 @@ fn tell(timing: &Timing, peer: Option<&PeerFigures>, with_histogram: bool) {
             peer.max, peer.p999, peer.p99, peer.p50, peer.count
         ));
     }
+    show::say(&format!(
+        "without sleep, in turns: at most {:.0} us; 99.9 % {:.0}, 99 % {:.0}, median {:.0}: no program is more \
+         punctual on this computer",
+        sleepless.max, sleepless.p999, sleepless.p99, sleepless.p50
+    ));
     let stages = &timing.stages;
     let [receive, control, send] =
         [&stages.receive, &stages.control, &stages.send].map(Latency::figures);
@@ -211,7 +233,7 @@ fn histogram(figures: &LatencyFigures) -> String {
     std::iter::once(head).chain(bars).collect::<String>().trim_end().to_owned()
 }
 
-fn part(timing: &Timing, peer: Option<&PeerFigures>) -> Value {
+fn part(Measured { timing, peer, sleepless }: &Measured) -> Value {
     let stages = &timing.stages;
     let interruptions = stages.interruptions;
     let wake_late = timing.wake_late.figures();
@@ -219,6 +241,7 @@ fn part(timing: &Timing, peer: Option<&PeerFigures>) -> Value {
         "grade": grade(wake_late.max),
         "wake_late_us": wake_late,
         "cyclictest_us": peer,
+        "sleepless_us": sleepless,
         "execution_us": timing.execution.figures(),
         "receive_us": stages.receive.figures(),
         "control_us": stages.control.figures(),
