@@ -49,7 +49,7 @@ def test_fifteen_hundred_drawn_calls_break_no_rule():
         (lambda: AXIS.delayed(2**31), "n_delay = 2147483648; at most 1998"),
         (lambda: analyze(PdIlc(0.5, 0.0), AXIS, 10**12), "n_samples = 1000000000000"),
         (lambda: analyze(PdIlc(0.5, 0.0), AXIS, 10**9), "n_samples = 1000000000; at most"),
-        (lambda: analyze(PdIlc(0.5, 0.0), AXIS, 10**7), "of an analysis = 10000000; at most 1000000"),
+        (lambda: analyze(PdIlc(0.5, 0.0), AXIS, 10**7), "an analysis = 10000000; at most 1000000"),
         (lambda: tune(AXIS, 10**7, noise_std=1e-6), "of an analysis = 10000000; at most 1000000"),
         (lambda: recommend(AXIS, 10**7, uncertainty=0.2), "10000000; at most 1000000"),
         (lambda: NormOptimalIlc(AXIS, 10**9, r=0.1), "n_samples = 1000000000; at most 10000000"),

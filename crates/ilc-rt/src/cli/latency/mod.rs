@@ -131,7 +131,7 @@ pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
     }
 }
 
-/// What was measured in turns.
+/// Figures of the three in turns.
 struct Measured {
     timing: Timing,
     /// Wake-ups of `cyclictest`, if it is installed.
