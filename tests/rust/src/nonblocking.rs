@@ -1,4 +1,4 @@
-//! What may not block, under the sanitizer for real-time code of LLVM (`RealtimeSanitizer`).
+//! Code that may not block, under the sanitizer of LLVM for real-time code (`RealtimeSanitizer`).
 //!
 //! `make rtsan` builds the tests of the tick with it: inside [`nonblocking`] every allocation, lock,
 //! sleep and system call that libc makes for us is an error with a stack trace. Without it the
