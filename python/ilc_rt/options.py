@@ -65,11 +65,13 @@ class Option:
             return [self.flags[0]] if bool(value) == (self.kind == "flag") else []
         if value is None:
             return []
-        if self.kind == "path":
-            text = os.fspath(value)
+        default = self.default
+        if self.kind == "number":
+            # `0` and `0.0` are one number.
+            text, default = repr(float(value)), default and repr(float(default))
         else:
-            text = repr(float(value)) if self.kind == "number" else str(value)
-        if text == self.default:
+            text = os.fspath(value) if self.kind == "path" else str(value)
+        if text == default:
             return []
         # Separately, a value that begins with a hyphen would be taken for an option.
         flag = self.flags[0]

@@ -11,7 +11,7 @@ import pytest
 
 from ilc_rt import Campaign, _native, identify
 from ilc_rt.errors import BadInputError
-from ilc_rt.options import arguments, options
+from ilc_rt.options import Option, arguments, options
 from ilc_rt.processes import find_program
 
 if TYPE_CHECKING:
@@ -75,6 +75,12 @@ def test_words_are_those_that_the_controller_parses():
         _native.check_options("walk", [])
     with pytest.raises(ValueError, match="verb = 'walk'"):
         _native.described_options("walk")
+
+
+def test_a_number_that_is_the_default_is_no_word_however_it_is_written():
+    pause = Option("pause_s", ("--pause-s",), "", "number", "0", (), None)
+    assert pause.words(0) == pause.words(0.0) == []
+    assert pause.words(0.5) == ["--pause-s", "0.5"]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::emcy;
-use ilc_rt::fieldbus::cia402::{Mode, State};
+use ilc_rt::fieldbus::cia402::{InputKind, State};
 
 use super::drive::DriveNode;
 use super::drive_mode::DriveMode;
@@ -30,12 +30,12 @@ impl DriveNode {
         let has_position = dictionary.take_written(self.slots.target_position);
         let has_velocity = dictionary.take_written(self.slots.target_velocity);
         let has_torque = dictionary.take_written(self.slots.target_torque);
-        match self.mode() {
-            Some(DriveMode::Cyclic(Mode::Csp)) => self.take_position(has_position),
-            Some(DriveMode::Cyclic(Mode::Csv)) => self.take_velocity(has_velocity),
-            Some(DriveMode::Cyclic(Mode::Cst)) => self.take_torque(has_torque),
-            // The drive's own modes take their targets when they need them.
-            _ => {}
+        // The drive's own modes take their targets when they need them.
+        let Some(DriveMode::Cyclic(mode)) = self.mode() else { return };
+        match mode.targeted() {
+            InputKind::Position => self.take_position(has_position),
+            InputKind::Velocity => self.take_velocity(has_velocity),
+            InputKind::Torque => self.take_torque(has_torque),
         }
     }
 
@@ -140,10 +140,11 @@ impl DriveNode {
     }
 
     fn controls_position(&self) -> bool {
-        matches!(
-            self.mode(),
-            Some(DriveMode::ProfilePosition | DriveMode::Homing | DriveMode::Cyclic(Mode::Csp))
-        )
+        match self.mode() {
+            Some(DriveMode::ProfilePosition | DriveMode::Homing) => true,
+            Some(DriveMode::Cyclic(mode)) => mode.targets_position(),
+            Some(DriveMode::ProfileVelocity) | None => false,
+        }
     }
 
     pub(super) fn mode(&self) -> Option<DriveMode> {

@@ -27,6 +27,19 @@ use ilc_rt::config::Cell;
 
 pub use derived::{hold_derived, hold_derived_file};
 
+/// An example of every mode, with its default input.
+pub const MODES: [&str; 3] = ["01_gantry.toml", "02_parallel.toml", "10_cst.toml"];
+
+/// An example of every mode with each of its inputs.
+pub const INPUTS: [&str; 6] = [
+    "01_gantry.toml",
+    "02_parallel.toml",
+    "10_cst.toml",
+    "11_csp_torque.toml",
+    "12_csp_velocity.toml",
+    "13_csv_torque.toml",
+];
+
 /// Returns the root of this checkout.
 ///
 /// Asked of cargo at run time: one target folder may serve several checkouts, and a test built in

@@ -6,18 +6,10 @@
 use ilc_rt::config::Cell;
 use ilc_rt::design::Plan;
 use ilc_rt::fieldbus::transport::Address;
-use ilc_tests::example_text;
+use ilc_tests::{INPUTS, example_text};
 use proptest::prelude::{any, prop, proptest};
 
 const FILE: &str = "cell.toml";
-const EXAMPLES: [&str; 6] = [
-    "01_gantry.toml",
-    "02_parallel.toml",
-    "10_cst.toml",
-    "11_csp_torque.toml",
-    "12_csp_velocity.toml",
-    "13_csv_torque.toml",
-];
 
 /// Returns the refusal of a cell before anything moves, as in a campaign.
 fn refusal(text: &str) -> Option<String> {
@@ -34,14 +26,14 @@ fn refusal(text: &str) -> Option<String> {
 
 /// The first example with one piece of its text replaced.
 fn edited(from: &str, to: &str) -> String {
-    let text = example_text(EXAMPLES[0]);
+    let text = example_text(INPUTS[0]);
     assert!(text.contains(from), "{from:?} is not in the example any more");
     text.replacen(from, to, 1)
 }
 
 #[test]
 fn the_examples_are_not_refused() {
-    for name in EXAMPLES {
+    for name in INPUTS {
         assert_eq!(refusal(&example_text(name)), None, "{name}");
     }
 }
@@ -208,17 +200,17 @@ fn whole_sections_that_are_missing_are_named() {
     };
     let table: [(&str, &str, &str, &[&str]); 6] = [
         (
-            EXAMPLES[0],
+            INPUTS[0],
             "[tcp_encoder]",
             "[simulation]",
             &["[learning] measure = tcp", "\"encoder\"", "no [tcp_encoder]"],
         ),
-        (EXAMPLES[0], "[[program.segment]]", "[learning]", &["[[program.segment]]"]),
-        (EXAMPLES[0], "[program]", "[learning]", &["program"]),
-        (EXAMPLES[0], "[bus]", "[[axis]]", &["missing field `bus`"]),
-        (EXAMPLES[0], "[[axis]]", "[tcp_encoder]", &["axis"]),
+        (INPUTS[0], "[[program.segment]]", "[learning]", &["[[program.segment]]"]),
+        (INPUTS[0], "[program]", "[learning]", &["program"]),
+        (INPUTS[0], "[bus]", "[[axis]]", &["missing field `bus`"]),
+        (INPUTS[0], "[[axis]]", "[tcp_encoder]", &["axis"]),
         (
-            EXAMPLES[1],
+            INPUTS[1],
             "[axis.position_loop]",
             "[axis.model]",
             &["[[axis]] x: position_loop = missing", "gain_per_s"],
@@ -235,7 +227,7 @@ fn whole_sections_that_are_missing_are_named() {
 
 #[test]
 fn no_segments_at_all() {
-    let text = example_text(EXAMPLES[0]);
+    let text = example_text(INPUTS[0]);
     let (begin, end) =
         (text.find("[[program.segment]]").unwrap(), text.find("[learning]").unwrap());
     let text = format!("{}segment = []\n{}", &text[..begin], &text[end..]);
@@ -254,11 +246,11 @@ proptest! {
 
     #[test]
     fn random_edits_never_panic(
-        example in 0..EXAMPLES.len(),
+        example in 0..INPUTS.len(),
         edits in prop::collection::vec((0..5_u8, any::<prop::sample::Index>(), any::<u8>()), 1..8),
     ) {
         let mut lines: Vec<Vec<u8>> =
-            example_text(EXAMPLES[example]).lines().map(|line| line.as_bytes().to_vec()).collect();
+            example_text(INPUTS[example]).lines().map(|line| line.as_bytes().to_vec()).collect();
         for (kind, at, byte) in edits {
             let place = at.index(lines.len());
             let other = usize::from(byte) % lines.len();

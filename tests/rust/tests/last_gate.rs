@@ -3,18 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use ilc_rt::config::{Cell, InputKind, Mode, mode};
+use ilc_rt::config::{Cell, InputKind, mode};
 use ilc_tests::rig::{Rig, Row};
-use ilc_tests::short;
-
-const CELLS: [&str; 6] = [
-    "01_gantry.toml",
-    "02_parallel.toml",
-    "10_cst.toml",
-    "11_csp_torque.toml",
-    "12_csp_velocity.toml",
-    "13_csv_torque.toml",
-];
+use ilc_tests::{INPUTS, short};
 
 /// The sum of program and learned input bends no more than a multiple of the jerk limit allows.
 fn check_jerk(cell: &Cell, rig: &Rig) {
@@ -26,7 +17,7 @@ fn check_jerk(cell: &Cell, rig: &Rig) {
     let rows: Vec<_> = line.rows().collect();
     for (axis, spec) in cell.axes.iter().enumerate() {
         let most = LEARNED_JERK * spec.limits.jerk_max_m_s3;
-        if spec.interface == Mode::Csp {
+        if spec.interface.targets_position() {
             let rounding = 4.0 / spec.counts_per_m / dt_s.powi(3);
             let held = |rows: &&[Row]| rows.iter().all(|row| row.controlword[axis] == 0x0F);
             for four in rows.windows(4).filter(held) {
@@ -52,7 +43,7 @@ fn check_jerk(cell: &Cell, rig: &Rig) {
 
 #[test]
 fn an_absurd_table_is_bounded_and_never_steps() {
-    for name in CELLS {
+    for name in INPUTS {
         let cell = short(name);
         for wild in [1e300, 1.0] {
             let mut rig = Rig::new(&cell, 1);
@@ -79,7 +70,7 @@ fn an_absurd_table_is_bounded_and_never_steps() {
             let rows: Vec<_> = line.rows().collect();
             for (axis, spec) in cell.axes.iter().enumerate() {
                 let limits = &spec.limits;
-                if spec.interface == Mode::Cst {
+                if spec.interface.targets_torque() {
                     let force = spec.force.unwrap();
                     let max = force.max_n() / force.rated_n * 1e3;
                     assert!(
@@ -91,15 +82,19 @@ fn an_absurd_table_is_bounded_and_never_steps() {
                     assert!(top <= 1.15 * limits.velocity_max_m_s * cell.cycle_s(), "{name} {top}");
                     continue;
                 }
-                let counts_max = match spec.interface {
-                    Mode::Csp => limits.velocity_max_m_s * cell.cycle_s() * spec.counts_per_m,
-                    Mode::Csv | Mode::Cst => limits.velocity_max_m_s * spec.counts_per_m,
+                let counts_max = match spec.interface.targeted() {
+                    InputKind::Position => {
+                        limits.velocity_max_m_s * cell.cycle_s() * spec.counts_per_m
+                    }
+                    InputKind::Velocity | InputKind::Torque => {
+                        limits.velocity_max_m_s * spec.counts_per_m
+                    }
                 };
                 for pair in rows.windows(2).filter(|pair| pair[0].controlword[axis] == 0x0F) {
                     let now = pair[1].target_counts[axis];
-                    let moved = match spec.interface {
-                        Mode::Csp => now - pair[0].target_counts[axis],
-                        Mode::Csv | Mode::Cst => now,
+                    let moved = match spec.interface.targeted() {
+                        InputKind::Position => now - pair[0].target_counts[axis],
+                        InputKind::Velocity | InputKind::Torque => now,
                     };
                     assert!(f64::from(moved).abs() <= counts_max + 1.01, "{name} {moved}");
                 }

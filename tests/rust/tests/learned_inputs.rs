@@ -9,7 +9,7 @@ use ilc_rt::record::EndStatus;
 use ilc_rt::servo::PhaseName;
 use ilc_tests::campaign::run;
 use ilc_tests::rig::Rig;
-use ilc_tests::{example, example_text, short};
+use ilc_tests::{INPUTS, MODES, example, example_text, short};
 
 /// Example, mode, quantity, and the share of the contour error that ten runs take away.
 const CELLS: [(&str, Mode, InputKind, f64); 4] = [
@@ -18,6 +18,22 @@ const CELLS: [(&str, Mode, InputKind, f64); 4] = [
     ("12_csp_velocity.toml", Mode::Csp, InputKind::Velocity, 0.8),
     ("13_csv_torque.toml", Mode::Csv, InputKind::Torque, 0.7),
 ];
+
+#[test]
+fn every_mode_has_an_example_with_each_of_its_inputs() {
+    let kind = |name: &str| {
+        let axis = &example(name).axes[0];
+        (axis.interface, axis.input_kind())
+    };
+    let (modes, inputs) = (MODES.map(kind), INPUTS.map(kind));
+    for mode in Mode::ALL {
+        assert!(modes.contains(&(mode, mode.targeted())), "{mode}: no example in MODES");
+        for input in mode.inputs() {
+            let name = input.name();
+            assert!(inputs.contains(&(mode, *input)), "{mode}, {name}: no example in INPUTS");
+        }
+    }
+}
 
 #[test]
 fn every_input_learns() {

@@ -45,6 +45,24 @@ fn a_part_program_goes_where_it_says() {
     assert!(last.iter().all(|value| value.abs() < 1e-12), "{last:?}");
 }
 
+/// Returns the `[program]` of an example without one of its keys or tables.
+fn without(example: &str, key: Key) -> String {
+    let name = key.name();
+    let word = name.trim_matches(['[', ']']).rsplit(['.', ' ']).next().unwrap();
+    let (table, list) = (format!("[program.{word}]"), format!("{word} = "));
+    let (mut inside, mut text) = (false, "[program]\n".to_owned());
+    for line in example.lines() {
+        if line.starts_with('[') {
+            inside = line == table;
+        }
+        if !inside && !line.starts_with(&list) {
+            text = text + line + "\n";
+        }
+    }
+    assert!(text.len() < "[program]\n".len() + example.len(), "{name} is not in {example:?}");
+    text
+}
+
 #[test]
 fn every_kind_of_path_is_planned() {
     let folder = Scratch::new();
@@ -62,16 +80,7 @@ fn every_kind_of_path_is_planned() {
             assert!(!is_given || entry.reads.contains(&key), "{name} {key:?}");
         }
         for needed in entry.needs {
-            let mut without = cell.clone();
-            match needed {
-                Key::Segments => without.program.segments.clear(),
-                Key::File => without.program.file = None,
-                Key::Spiral => without.program.spiral = None,
-                Key::Raster => without.program.raster = None,
-                Key::Modulated => without.program.modulated = None,
-                other => panic!("{other:?} is needed by no kind"),
-            }
-            let line = Plan::new(&without, None, true).unwrap_err().to_string();
+            let line = cell_with(&without(entry.example, *needed)).unwrap_err();
             assert!(line.contains("= missing: ") && line.contains("needed by this kind"), "{line}");
         }
     }

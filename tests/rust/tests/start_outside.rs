@@ -4,14 +4,12 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::campaign;
-use ilc_rt::config::{Cell, Mode};
+use ilc_rt::config::{Cell, InputKind};
 use ilc_rt::record::EndStatus;
 use ilc_rt::servo::{PhaseName, StopReason};
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::rig::Rig;
-use ilc_tests::{Scratch, example_text, short};
-
-const CELLS: [&str; 3] = ["01_gantry.toml", "02_parallel.toml", "10_cst.toml"];
+use ilc_tests::{MODES, Scratch, example_text, short};
 
 /// Returns the short cell with an axis at a given position.
 fn standing(name: &str, axis: usize, start_m: f64) -> Cell {
@@ -22,7 +20,7 @@ fn standing(name: &str, axis: usize, start_m: f64) -> Cell {
 
 #[test]
 fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
-    for name in CELLS {
+    for name in MODES {
         for (axis, start_m) in [(0, 0.15), (1, 0.15), (0, -0.3), (1, -0.021), (1, 20.0)] {
             for lockstep in [true, false] {
                 let cell = standing(name, axis, start_m);
@@ -44,10 +42,10 @@ fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
                     for row in line.rows() {
                         assert_eq!(row.controlword[number] & 0x0F, 0, "{name}");
                         let target = row.target_counts[number];
-                        match spec.interface {
-                            Mode::Csp => assert!(target == at || target == 0, "{target}"),
-                            Mode::Csv => assert_eq!(target, 0),
-                            Mode::Cst => assert_eq!(row.torque[number], 0),
+                        match spec.interface.targeted() {
+                            InputKind::Position => assert!(target == at || target == 0, "{target}"),
+                            InputKind::Velocity => assert_eq!(target, 0),
+                            InputKind::Torque => assert_eq!(row.torque[number], 0),
                         }
                     }
                 }
@@ -62,7 +60,7 @@ fn the_refusal_is_one_sentence_with_place_and_limits() {
         ("m", "axis y is at 0.15 m, outside -0.02 to 0.1 m"),
         ("rad", "axis y is at 0.15 rad, outside -0.02 to 0.1 rad"),
     ] {
-        let mut cell = standing(CELLS[0], 1, 0.15);
+        let mut cell = standing(MODES[0], 1, 0.15);
         if unit == "rad" {
             cell.axes[1].unit = ilc_rt::config::AxisUnit::Rad;
         }
@@ -77,7 +75,7 @@ fn the_refusal_is_one_sentence_with_place_and_limits() {
 
 #[test]
 fn an_axis_at_its_limit_or_a_little_beyond_is_brought_back_gently() {
-    for name in CELLS {
+    for name in MODES {
         for start_m in [0.1, 0.1 + 1e-4, -0.02, -0.02 - 1e-4] {
             let cell = standing(name, 0, start_m);
             let mut rig = Rig::new(&cell, 1);
@@ -99,7 +97,7 @@ fn an_axis_at_its_limit_or_a_little_beyond_is_brought_back_gently() {
 #[test]
 fn a_start_that_is_no_number_is_refused_where_it_is_written() {
     for bad in ["nan", "inf", "-inf", "1e9"] {
-        let text = example_text(CELLS[0]).replacen(
+        let text = example_text(MODES[0]).replacen(
             "position_start_m = 0.04",
             &format!("position_start_m = {bad}"),
             1,
@@ -113,17 +111,17 @@ fn a_start_that_is_no_number_is_refused_where_it_is_written() {
 /// without one.
 #[test]
 fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
-    for name in CELLS {
+    for name in MODES {
         let mut cell = short(name);
         // The program goes to 80 mm; the limit lies where the learned input exceeds it.
         cell.axes[0].limits.position_max_m = 0.0805;
         (cell.learning.input_max_m, cell.learning.input_max_m_s) = (0.005, 0.05);
         let mut rig = Rig::new(&cell, 1);
         let n_samples = rig.n_samples;
-        let size = match cell.axes[0].interface {
-            Mode::Csp => 0.004,
-            Mode::Csv => 0.05,
-            Mode::Cst => 190.0,
+        let size = match cell.axes[0].interface.targeted() {
+            InputKind::Position => 0.004,
+            InputKind::Velocity => 0.05,
+            InputKind::Torque => 190.0,
         };
         let table = (0..2 * n_samples).map(|i| {
             let turn = (i / 2) as f64 / n_samples as f64 * std::f64::consts::TAU;
@@ -137,7 +135,7 @@ fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
         let plant_m = line.plant_m(0);
         let farthest = plant_m.iter().fold(f64::MIN, |most, m| most.max(*m));
         assert!(farthest <= 0.0805 + 2e-4, "{name}: {farthest}");
-        if spec.interface == Mode::Csp {
+        if spec.interface.targets_position() {
             let target: Vec<f64> = line
                 .rows()
                 .filter(|row| row.controlword[0] == 0x0F)

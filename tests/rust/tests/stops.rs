@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use ilc_rt::campaign::{self, Outcome};
-use ilc_rt::config::{Cell, InputKind, Mode};
+use ilc_rt::config::{Cell, InputKind};
 use ilc_rt::fieldbus::canopen::{NmtCommand, emcy};
 use ilc_rt::fieldbus::cia402::State;
 use ilc_rt::fieldbus::transport::{Responder, loopback};
@@ -16,22 +16,13 @@ use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::far_side::FarSide;
 use ilc_tests::rig::{Rig, Tap, node, write_object};
-use ilc_tests::{Scratch, short};
+use ilc_tests::{INPUTS, Scratch, short};
 
 /// Node of the axis that fails, and of the tool's encoder.
 const X: u8 = 1;
 const TOOL: u8 = 10;
 /// Sample of run 1 at which events happen: in full motion.
 const MIDDLE: u32 = 150;
-
-const CELLS: [&str; 6] = [
-    "01_gantry.toml",
-    "02_parallel.toml",
-    "10_cst.toml",
-    "11_csp_torque.toml",
-    "12_csp_velocity.toml",
-    "13_csv_torque.toml",
-];
 
 /// A table that moves both axes smoothly and well within bounds.
 fn smooth_table(n_samples: usize, size: f64) -> Box<[f64]> {
@@ -78,8 +69,8 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
         let enabled = rows.iter().position(|row| row.controlword[axis] == 0x0F);
         let enabled = enabled.map_or(rows.len(), |row| row + 3);
         let (v_max, a_max) = (spec.limits.velocity_max_m_s, spec.limits.acceleration_max_m_s2);
-        match spec.interface {
-            Mode::Csp => {
+        match spec.interface.targeted() {
+            InputKind::Position => {
                 // Half a count of rounding at either end of a step.
                 let step_max = v_max * dt_s + 1.01 / scale;
                 for k in enabled..rows.len() {
@@ -103,7 +94,7 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
                 let journey = (rest - target[stop_at - 1]).abs();
                 assert!(journey < 0.01, "axis {axis} went on for {journey} m");
             }
-            Mode::Csv => {
+            InputKind::Velocity => {
                 // The velocity follows from a measured position, so it may be slightly higher than
                 // the reference's, but never a jump.
                 for k in stop_at.max(enabled)..rows.len() {
@@ -113,7 +104,7 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
                 assert!(target.iter().all(|v| v.abs() <= v_max + 1.0 / scale));
             }
             // A force is no motion: the plant shows how the drive brakes.
-            Mode::Cst => {
+            InputKind::Torque => {
                 let plant_m = line.plant_m(axis);
                 let journey = (plant_m[plant_m.len() - 1] - plant_m[stop_at - 1]).abs();
                 assert!(journey < 0.01, "axis {axis} went on for {journey} m");
@@ -125,7 +116,7 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
         }
         // Neither does an offset step, nor stay.
         let torque = rows.iter().map(|row| f64::from(row.torque[axis])).collect::<Vec<_>>();
-        if let (Some(force), true) = (spec.force, spec.interface != Mode::Cst) {
+        if let (Some(force), true) = (spec.force, !spec.interface.targets_torque()) {
             let step_max_n = 4.0 * force.mass_kg * spec.limits.jerk_max_m_s3 * dt_s;
             for k in stop_at.max(1)..torque.len() {
                 let step_n = (torque[k] - torque[k - 1]).abs() * 1e-3 * force.rated_n;
@@ -158,7 +149,7 @@ fn finish(cell: &Cell, rig: &mut Rig, axes: &[usize]) {
 
 #[test]
 fn asked_to_stop() {
-    for name in CELLS {
+    for name in INPUTS {
         let cell = short(name);
         let mut rig = in_motion(&cell);
         rig.ask_to_stop(15);
@@ -170,7 +161,7 @@ fn asked_to_stop() {
 
 #[test]
 fn asked_to_stop_in_every_phase() {
-    for name in CELLS {
+    for name in INPUTS {
         let cell = short(name);
         for phase in
             [PhaseName::Enabling, PhaseName::Returning, PhaseName::Settling, PhaseName::Running]
@@ -195,7 +186,7 @@ fn asked_to_stop_in_every_phase() {
 
 #[test]
 fn a_drive_that_falls_silent_stops_the_other() {
-    for name in CELLS {
+    for name in INPUTS {
         let cell = short(name);
         let mut rig = in_motion(&cell);
         rig.tap.line().meddle(|machine, _| assert!(machine.mute(node(X))));
@@ -213,7 +204,7 @@ fn a_drive_that_falls_silent_stops_the_other() {
 
 #[test]
 fn a_tool_that_falls_silent_stops_both() {
-    for name in CELLS {
+    for name in INPUTS {
         let cell = short(name);
         let mut rig = in_motion(&cell);
         rig.tap.line().meddle(|machine, _| assert!(machine.mute(node(TOOL))));
@@ -224,7 +215,7 @@ fn a_tool_that_falls_silent_stops_both() {
 
 #[test]
 fn a_drive_with_a_following_error_stops_the_other() {
-    let cell = short(CELLS[0]);
+    let cell = short(INPUTS[0]);
     let mut rig = in_motion(&cell);
     // A window of 10 um: the drive detects a following error, as with a worn brake.
     rig.tap.line().meddle(|machine, _| write_object(X, 0x6065, 1000)(machine));
@@ -239,7 +230,7 @@ fn a_drive_with_a_following_error_stops_the_other() {
 
 #[test]
 fn an_axis_that_cannot_follow_stops_both() {
-    for name in CELLS {
+    for name in INPUTS {
         let mut cell = short(name);
         // The motor of x is too weak to overcome its friction.
         let simulation = &mut cell.axes[0].simulation;
@@ -260,7 +251,7 @@ fn an_axis_that_cannot_follow_stops_both() {
 
 #[test]
 fn a_table_with_what_is_no_number_stops_before_it_is_used() {
-    for name in CELLS {
+    for name in INPUTS {
         let cell = short(name);
         for bad in [f64::NAN, f64::INFINITY] {
             let mut rig = Rig::new(&cell, 3);
@@ -277,7 +268,7 @@ fn a_table_with_what_is_no_number_stops_before_it_is_used() {
 
 #[test]
 fn overruns_are_counted_and_many_in_a_row_stop() {
-    let mut cell = short(CELLS[0]);
+    let mut cell = short(INPUTS[0]);
     cell.safety.overrun_cycles_max = 5;
     let mut rig = Rig::new(&cell, 3);
     rig.tick_into_run(0, MIDDLE);
@@ -296,7 +287,7 @@ fn overruns_are_counted_and_many_in_a_row_stop() {
 
 #[test]
 fn a_node_that_restarts_stops_the_others() {
-    for name in CELLS {
+    for name in INPUTS {
         let cell = short(name);
         for (number, rest) in [(X, &[1][..]), (TOOL, &[0, 1][..])] {
             let mut rig = in_motion(&cell);
@@ -335,7 +326,7 @@ fn campaign_with(
 
 #[test]
 fn the_reason_is_told_in_one_sentence() {
-    let cell = short(CELLS[0]);
+    let cell = short(INPUTS[0]);
     let fault = |meddle: fn(&mut ilc_sim::Machine, &mut dyn FnMut(ilc_rt::fieldbus::Frame)),
                  kind: FaultKind,
                  parts: &[&str]| {
@@ -384,7 +375,7 @@ fn the_reason_is_told_in_one_sentence() {
 
 #[test]
 fn a_signal_interrupts_and_is_no_fault() {
-    let cell = short(CELLS[0]);
+    let cell = short(INPUTS[0]);
     let scratch = Scratch::new();
     let options = options(scratch.file("library.db"), 5);
     let stop = Arc::clone(&options.session.stop);
@@ -401,7 +392,7 @@ fn a_signal_interrupts_and_is_no_fault() {
 
 #[test]
 fn a_silent_drive_on_a_real_bus_is_waited_for_once() {
-    let mut cell = short(CELLS[0]);
+    let mut cell = short(INPUTS[0]);
     cell.safety.answer_timeout_s = 1.0;
     let scratch = Scratch::new();
     let (near, far) = loopback::pair(1024).unwrap();

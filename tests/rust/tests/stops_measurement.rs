@@ -5,14 +5,13 @@
 
 use std::collections::VecDeque;
 
-use ilc_rt::config::{Cell, Mode};
+use ilc_rt::config::{Cell, InputKind};
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::cia402::{DriveMotionTpdo2, StatusTpdo1};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::rig::{Distort, Rig, node};
-use ilc_tests::short;
+use ilc_tests::{MODES, short};
 
-const CELLS: [&str; 3] = ["01_gantry.toml", "02_parallel.toml", "10_cst.toml"];
 /// Ticks after which the test requests a stop if the loop has not found a reason for one.
 const PATIENCE: u32 = 150;
 
@@ -100,13 +99,13 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         let (a_max, jerk) = (limits.acceleration_max_m_s2, limits.jerk_max_m_s3);
         let target: Vec<f64> =
             rows.iter().map(|row| f64::from(row.target_counts[axis]) / spec.counts_per_m).collect();
-        let velocity_m_s: Vec<f64> = match spec.interface {
-            Mode::Csp => std::iter::once(0.0)
+        let velocity_m_s: Vec<f64> = match spec.interface.targeted() {
+            InputKind::Position => std::iter::once(0.0)
                 .chain(target.windows(2).map(|pair| (pair[1] - pair[0]) / dt_s))
                 .collect(),
-            Mode::Csv => target,
+            InputKind::Velocity => target,
             // The plant itself: a force is no motion.
-            Mode::Cst => std::iter::once(0.0)
+            InputKind::Torque => std::iter::once(0.0)
                 .chain(line.plant_m(axis).windows(2).map(|pair| (pair[1] - pair[0]) / dt_s))
                 .collect(),
         };
@@ -114,14 +113,14 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         // While drives are only told to disable, the target is meaningless.
         let held = |k: usize| rows[k].controlword[axis] == 0x0F;
         for k in began.max(1)..rows.len() {
-            if held(k) && held(k - 1) && spec.interface != Mode::Cst {
+            if held(k) && held(k - 1) && !spec.interface.targets_torque() {
                 let a = (velocity_m_s[k] - velocity_m_s[k - 1]) / dt_s;
                 assert!(a.abs() <= a_max * 1.001 + rounding, "{what}: axis {axis}: {a} at {k}");
             }
         }
         let plant_m = line.plant_m(axis);
         // Not even before the failure was noticed.
-        if spec.interface != Mode::Cst {
+        if !spec.interface.targets_torque() {
             let asked_m_s = (1..rows.len())
                 .filter(|k| held(*k) && held(k - 1))
                 .map(|k| velocity_m_s[k].abs())
@@ -131,7 +130,7 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         }
         // The command is within the limit; the PI velocity loop of a drive overshoots it by a few per
         // cent if it gets there as fast as the gate allows, as with a frozen encoder.
-        let overshoot = if spec.interface == Mode::Csp { 1.01 } else { 1.1 };
+        let overshoot = if spec.interface.targets_position() { 1.01 } else { 1.1 };
         let top_m_s = plant_m.windows(2).map(|w| ((w[1] - w[0]) / dt_s).abs()).fold(0.0, f64::max);
         assert!(
             top_m_s <= limits.velocity_max_m_s * overshoot,
@@ -143,14 +142,14 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         let w = v + a_0 * a_0 / (2.0 * jerk);
         let braking_m = w * w / (2.0 * a_max) + w * (a_max + a_0) / jerk + 3.0 * v * dt_s;
         // A drive that closes the position loop (CSP) catches up with its command.
-        let lag_m = match spec.interface {
-            Mode::Csp => {
+        let lag_m = match spec.interface.targeted() {
+            InputKind::Position => {
                 let at = f64::from(rows[began - 1].target_counts[axis]) / spec.counts_per_m;
                 (at - plant_m[began - 1]).abs()
             }
             // One that closes the velocity loop (CSV) lags by its time constant. In torque mode it hears
             // of its quick stop a cycle later, and its velocity loop overshoots.
-            Mode::Csv | Mode::Cst => 0.02 * v,
+            InputKind::Velocity | InputKind::Torque => 0.02 * v,
         };
         let way_m = (plant_m[plant_m.len() - 1] - plant_m[began - 1]).abs();
         assert!(
@@ -193,7 +192,7 @@ fn rig_in(cell: &Cell, phase: PhaseName, lockstep: bool) -> Rig {
 
 #[test]
 fn no_stop_trusts_a_measurement_that_lies() {
-    for name in CELLS {
+    for name in MODES {
         let cell = short(name);
         for lockstep in [false, true] {
             for phase in [
@@ -225,7 +224,7 @@ fn no_stop_trusts_a_measurement_that_lies() {
 
 #[test]
 fn a_frozen_velocity_axis_is_not_driven_on() {
-    let cell = short(CELLS[1]);
+    let cell = short(MODES[1]);
     let mut rig = rig_in(&cell, PhaseName::Running, false);
     rig.tap.line().distort(distort(Lie::Frozen, 1));
     rig.tick_to_end();
@@ -239,7 +238,7 @@ fn a_frozen_velocity_axis_is_not_driven_on() {
 
 #[test]
 fn a_position_that_jumps_is_not_believed() {
-    for name in CELLS {
+    for name in MODES {
         let cell = short(name);
         let mut rig = rig_in(&cell, PhaseName::Running, false);
         rig.tap.line().distort(distort(Lie::Offset(500_000), 1));

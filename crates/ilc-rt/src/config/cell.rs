@@ -91,7 +91,7 @@ pub struct CellSection {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct BusSection {
-    /// Bus: `can:vcan0`, `udp:239.74.163.2[:port]`, `zenoh:KEY` or `loopback:`; `--bus` replaces it. With `?fd=1` it has
+    /// Bus, e.g. `can:vcan0` or `udp:239.74.163.2`; README.md has all kinds. `--bus` replaces it. With `?fd=1` it has
     /// CAN FD, if every node takes it; `data_bitrate=N` is the bit rate of its data phase.
     pub address: String,
     /// Bit rate of a CAN bus, for the load check; with CAN FD that of arbitration.

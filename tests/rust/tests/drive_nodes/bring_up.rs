@@ -19,8 +19,9 @@ fn a_drive_says_who_it_is_and_is_configured() {
         let mut bench = Bench::new(ClockMode::LockStep);
         let identity = bring_up(&mut bench.bus, &setup(mode)).unwrap();
         assert_eq!(identity.device_type & 0xFFFF, 402);
-        // Profile position and velocity, homing, cyclic position and velocity; torque may be there.
-        assert_eq!(identity.supported_modes & !0x200, 0x1A5);
+        // Profile position and velocity, homing, and what the controller commands.
+        let cyclic = Mode::ALL.iter().fold(0, |bits, mode| bits | mode.supported_bit());
+        assert_eq!(identity.supported_modes, 0x25 | cyclic);
         assert_eq!(identity.identity, [0, 402, 1, 1]);
         assert_eq!(bench.read(0x6061, 0), u32::from(mode.code().cast_unsigned()));
         assert_eq!(bench.read(0x60C2, 1), 1);

@@ -11,7 +11,7 @@ use crate::campaign::{inputs, nodes};
 use crate::config::{Axis, Cell, LawName, Learning, Measure};
 use crate::fieldbus::{Bus, BusError};
 use crate::record::EndStatus;
-use crate::trajectory::kind::{PathKind, Program, Segment};
+use crate::trajectory::kind::Segment;
 
 /// Distance from the limit at which an axis comes to rest inside, as a share of its travel.
 const INSIDE_SHARE: f64 = 0.01;
@@ -141,26 +141,14 @@ fn alone(cell: Cell, outside: &[(&mut Task<'_>, f64)]) -> Cell {
         Learning { law: LawName::None, measure: Measure::Encoder, ..Learning::default() };
     alone.simulation.changes = Vec::new();
     let to_m: Vec<f64> = alone.axes.iter().filter_map(|axis| target_m(&axis.name)).collect();
-    alone.program = Program {
-        start_m: to_m.clone(),
-        kind: PathKind::default(),
-        file: None,
-        rapid_m_s: None,
-        block_delete: false,
-        curvature_acceleration_max_m_s2: None,
-        butterfly: None,
-        spiral: None,
-        raster: None,
-        modulated: None,
-        segments: vec![Segment {
-            to_m,
-            feed_m_s: None,
-            center_m: None,
-            clockwise: false,
-            dwell_s: 0.0,
-        }],
-        ..alone.program
+    let segment = Segment {
+        to_m: to_m.clone(),
+        feed_m_s: None,
+        center_m: None,
+        clockwise: false,
+        dwell_s: 0.0,
     };
+    alone.program = alone.program.along(to_m, vec![segment]);
     alone
 }
 

@@ -67,14 +67,19 @@ impl Mode {
         }
     }
 
+    /// Returns the quantity of the target: the first input.
+    pub const fn targeted(self) -> InputKind {
+        self.inputs()[0]
+    }
+
     /// Returns whether the target is a torque, so that the drive closes no loop.
     pub fn targets_torque(self) -> bool {
-        self.inputs()[0] == InputKind::Torque
+        self.targeted() == InputKind::Torque
     }
 
     /// Returns whether the target is a position, so that the drive closes both loops.
     pub fn targets_position(self) -> bool {
-        self.inputs()[0] == InputKind::Position
+        self.targeted() == InputKind::Position
     }
 
     /// Returns the objects of a command, of 16, 32 and 16 bits. A drive in torque mode gets its

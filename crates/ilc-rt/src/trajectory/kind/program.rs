@@ -111,6 +111,31 @@ impl Key {
 }
 
 impl Program {
+    /// Returns straight moves and arcs from `start_m`, at the feed, corners and times of this program.
+    #[must_use]
+    pub fn along(&self, start_m: Vec<f64>, segments: Vec<Segment>) -> Self {
+        // Every key is named: what another kind reads must not stay.
+        Self {
+            start_m,
+            feed_m_s: self.feed_m_s,
+            kind: PathKind::Points,
+            file: None,
+            rapid_m_s: None,
+            block_delete: false,
+            curvature_acceleration_max_m_s2: None,
+            butterfly: None,
+            spiral: None,
+            raster: None,
+            modulated: None,
+            corner: self.corner,
+            blend_s: self.blend_s,
+            dwell_before_s: self.dwell_before_s,
+            dwell_after_s: self.dwell_after_s,
+            settle_s: self.settle_s,
+            segments,
+        }
+    }
+
     /// Every key that only some kinds read, and true if it is given.
     pub fn given(&self) -> [(Key, bool); 10] {
         let is_extra = |s: &Segment| s.center_m.is_some() || s.clockwise || s.dwell_s > 0.0;
