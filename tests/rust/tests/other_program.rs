@@ -170,7 +170,8 @@ fn a_law_that_refuses_the_parameters_of_a_run_says_why_and_does_not_begin_with_z
     run(&gantry(BASIS, false), &options(path.clone(), 1)).unwrap();
     let library = Library::open(&path).unwrap();
     let other = gantry(BASIS, true);
-    let plan = Plan::new(&other, None, true).unwrap();
+    let mut plan = Plan::new(&other, None, true).unwrap();
+    plan.meta.law = "basis_functions".to_owned();
     for at_once in [true, false] {
         let mut law = Refusing { at_once };
         let taken =
