@@ -38,7 +38,8 @@ impl Settings {
         let Realtime { late_share, cpu, spin_us, .. } = cell.realtime;
         let request = RtRequest { cpu, ..RtRequest::default() };
         let is_required = session.require_rt;
-        let Readiness { report, spin } = Readiness::probe(request, spin_us);
+        let cycle = Nanos::from_micros(cell.cell.cycle_us);
+        let Readiness { report, spin } = Readiness::probe(request, cycle, spin_us);
         let settings = Self { request, spin, late_share, is_required };
         settings.accept(report)?;
         Ok(settings)

@@ -5,11 +5,45 @@
 use super::clock::{Clock, MonotonicClock, Nanos};
 use super::thread::{RtReport, RtRequest, enter};
 
-/// Wake-ups tried, and the time between them.
-const WAKE_UPS: usize = 100;
+/// Time between the wake-ups that are tried.
 const EVERY: Nanos = Nanos::from_micros(200);
 /// Shortest and longest measured time before a tick at which the loop's thread stops sleeping.
 const SPIN_US: (u32, u32) = (20, 100);
+/// The longest with a processor of its own, which nobody else wants, and as a part of the cycle.
+const OWN_SPIN: (Nanos, u64) = (Nanos::from_micros(300), 3);
+
+/// Choice of the time of busy-waiting: so many wake-ups are tried, and it is longer than all but one of them are late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Trial {
+    wake_ups: usize,
+    longest: Nanos,
+}
+
+impl Trial {
+    fn new(request: RtRequest, cycle: Nanos) -> Self {
+        let shared = Nanos::from_micros(SPIN_US.1);
+        if request.cpu.is_none() {
+            return Self { wake_ups: 100, longest: shared };
+        }
+        let (most, part) = OWN_SPIN;
+        let longest = most.0.min(cycle.0 / part).max(shared.0);
+        Self { wake_ups: 1000, longest: Nanos(longest) }
+    }
+
+    /// Measures, within the bounds.
+    fn measure(self) -> Nanos {
+        let clock = MonotonicClock::new(Nanos(0));
+        let mut late_ns = vec![0_u64; self.wake_ups];
+        for late_ns in &mut late_ns {
+            let due = clock.now().plus(EVERY);
+            clock.sleep_until(due);
+            *late_ns = clock.now().since(due).0;
+        }
+        late_ns.sort_unstable();
+        let least = Nanos::from_micros(SPIN_US.0);
+        Nanos(late_ns[self.wake_ups - 2].clamp(least.0, self.longest.0))
+    }
+}
 
 /// Settings that a thread was granted, and the busy-waiting that it needs.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,11 +55,13 @@ pub struct Readiness {
 }
 
 impl Readiness {
-    /// Tries a request on a thread that ends at once; `spin_us` in place of a measured time of busy-waiting.
-    pub fn probe(request: RtRequest, spin_us: Option<u32>) -> Self {
+    /// Tries a request for a loop of a cycle on a thread that ends at once; `spin_us` in place of a measured time of
+    /// busy-waiting.
+    pub fn probe(request: RtRequest, cycle: Nanos, spin_us: Option<u32>) -> Self {
         let tried = std::thread::spawn(move || {
             let report = enter(request);
-            let spin = spin_us.map_or_else(measure_spin, Nanos::from_micros);
+            let spin =
+                spin_us.map_or_else(|| Trial::new(request, cycle).measure(), Nanos::from_micros);
             Self { report, spin }
         });
         tried.join().unwrap_or_else(|_| Self {
@@ -35,38 +71,37 @@ impl Readiness {
     }
 }
 
-/// Returns the 99th percentile of the lateness of wake-ups, within bounds.
-fn measure_spin() -> Nanos {
-    let clock = MonotonicClock::new(Nanos(0));
-    let mut late_ns = [0_u64; WAKE_UPS];
-    for late_ns in &mut late_ns {
-        let due = clock.now().plus(EVERY);
-        clock.sleep_until(due);
-        *late_ns = clock.now().since(due).0;
-    }
-    late_ns.sort_unstable();
-    let (least, most) = (Nanos::from_micros(SPIN_US.0), Nanos::from_micros(SPIN_US.1));
-    Nanos(late_ns[WAKE_UPS - 2].clamp(least.0, most.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::thread::Refused;
     use super::*;
 
+    const CYCLE: Nanos = Nanos::from_micros(1000);
+
     #[test]
     fn busy_waiting_is_measured_within_bounds_unless_it_is_given() {
         let request = RtRequest { lock_memory: false, ..RtRequest::default() };
-        let measured = Readiness::probe(request, None).spin;
+        let measured = Readiness::probe(request, CYCLE, None).spin;
         assert!((20_000..=100_000).contains(&measured.0), "{measured:?}");
-        assert_eq!(Readiness::probe(request, Some(0)).spin, Nanos(0));
-        assert_eq!(Readiness::probe(request, Some(7)).spin, Nanos(7_000));
+        assert_eq!(Readiness::probe(request, CYCLE, Some(0)).spin, Nanos(0));
+        assert_eq!(Readiness::probe(request, CYCLE, Some(7)).spin, Nanos(7_000));
+    }
+
+    #[test]
+    fn a_processor_of_its_own_may_be_kept_busy_for_a_third_of_the_cycle() {
+        let longest_us = |cpu, cycle_us| {
+            let request = RtRequest { cpu, ..RtRequest::default() };
+            Trial::new(request, Nanos::from_micros(cycle_us)).longest.0 / 1000
+        };
+        assert_eq!([50, 1000, 10_000].map(|cycle_us| longest_us(None, cycle_us)), [100; 3]);
+        let own = [50, 300, 600, 900, 10_000].map(|cycle_us| longest_us(Some(1), cycle_us));
+        assert_eq!(own, [100, 100, 200, 300, 300]);
     }
 
     #[test]
     fn what_was_refused_is_named() {
         let request = RtRequest { priority: 1000, lock_memory: false, cpu: Some(100_000) };
-        let refused = Readiness::probe(request, Some(0)).report.refused;
+        let refused = Readiness::probe(request, CYCLE, Some(0)).report.refused;
         assert!(
             matches!(refused[..], [Refused::Priority(1000, _), Refused::Processor(100_000, _)]),
             "{refused:?}"

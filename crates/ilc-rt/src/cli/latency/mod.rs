@@ -40,6 +40,7 @@ const BAR: f64 = 50.0;
   ilc-rt latency
   ilc-rt latency gantry.toml
   ilc-rt latency --load --histogram
+  ilc-rt latency --cpu 1 --seconds 20
   ilc-rt latency --cycle-us 500 --seconds 60 --json latency.json")]
 pub(super) struct LatencyArguments {
     /// Cell whose loop is measured; one axis if not given. Its drives are not needed: in their place axes in memory
@@ -52,6 +53,9 @@ pub(super) struct LatencyArguments {
     /// as late as the computer itself makes it, take as long.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     seconds: u32,
+    /// Processor for the loop, and for cyclictest; that of the cell if not given.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(0..=1023))]
+    cpu: Option<u16>,
     /// Busy-wait the last microseconds before each deadline; that of the cell, or as long as the wake-ups are measured
     /// to be late, if not given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(0..=1000))]
@@ -76,10 +80,12 @@ pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
             return EXIT_BAD_INPUT;
         }
     };
-    let request = RtRequest { cpu: cell.realtime.cpu, ..RtRequest::default() };
-    let spin = Readiness::probe(request, arguments.spin_us.or(cell.realtime.spin_us)).spin;
-    let clock = Arc::new(MonotonicClock::new(spin));
+    let cpu = arguments.cpu.map(usize::from).or(cell.realtime.cpu);
+    let request = RtRequest { cpu, ..RtRequest::default() };
     let cycle_us = arguments.cycle_us.unwrap_or(cell.cell.cycle_us);
+    let spin_us = arguments.spin_us.or(cell.realtime.spin_us);
+    let spin = Readiness::probe(request, Nanos::from_micros(cycle_us), spin_us).spin;
+    let clock = Arc::new(MonotonicClock::new(spin));
     let mut cycle = match still::still_loop(&cell, cycle_us, &clock) {
         Ok(prepared) => prepared,
         Err(refusal) => {
@@ -156,7 +162,7 @@ fn measure(
         let turn_s = seconds / n_turns + u32::from(turn < seconds % n_turns);
         let end = || clock.now().plus(Nanos(u64::from(turn_s) * 1_000_000_000));
         run_until(cycle, &clock, &mut timing, end());
-        is_there = is_there && peer.measure(cycle_us, turn_s, request.priority);
+        is_there = is_there && peer.measure(cycle_us, turn_s, request);
         run_until(cycle, &sleepless_clock, &mut sleepless, end());
     }
     let peer = is_there.then(|| peer.figures());

@@ -5,6 +5,8 @@ use std::process::{Command, Stdio};
 
 use serde::Serialize;
 
+use crate::rt::RtRequest;
+
 /// Buckets of its histogram, of 1 us.
 const BUCKETS: usize = 20_000;
 
@@ -26,12 +28,15 @@ pub(super) struct PeerFigures {
 }
 
 impl Peer {
-    /// Measures for some seconds with the priority of the loop; false if `cyclictest` is not installed or fails,
+    /// Measures for some seconds with priority and processor of the loop; false if `cyclictest` is not installed or fails,
     /// as it does without the right to a real-time priority.
-    pub(super) fn measure(&mut self, cycle_us: u32, seconds: u32, priority: i32) -> bool {
+    pub(super) fn measure(&mut self, cycle_us: u32, seconds: u32, request: RtRequest) -> bool {
         let mut command = Command::new("cyclictest");
         command.args(["--quiet", "--mlockall", "--threads=1", "--policy=fifo"]);
-        command.arg(format!("--priority={priority}"));
+        command.arg(format!("--priority={}", request.priority));
+        if let Some(cpu) = request.cpu {
+            command.arg(format!("--affinity={cpu}"));
+        }
         command.arg(format!("--interval={cycle_us}"));
         command.arg(format!("--duration={seconds}s"));
         command.arg(format!("--histogram={BUCKETS}"));
