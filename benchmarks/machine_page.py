@@ -129,7 +129,8 @@ def main() -> None:
         "",
         f"Written by `make rt-page` on {datetime.now(timezone.utc):%Y-%m-%d}. {processor()}, "
         f"{os.cpu_count()} processors, kernel {wake['rt']['kernel']}; {wake['rt']['policy']} "
-        f"{wake['rt']['priority']} on processor {own}, busy-waiting {wake['rt']['spin_us']:.0f} us.",
+        f"{wake['rt']['priority']} on processor {own}, "
+        f"busy-waiting {wake['rt']['spin_us']:.0f} us.",
         "",
         "## Wake-ups at 1 kHz",
         "",

@@ -9,7 +9,7 @@ use super::thread::{RtReport, RtRequest, enter};
 const EVERY: Nanos = Nanos::from_micros(200);
 /// Shortest and longest measured time before a tick at which the loop's thread stops sleeping.
 const SPIN_US: (u32, u32) = (20, 100);
-/// The longest with a processor of its own, which nobody else wants, and as a part of the cycle.
+/// The longest with a processor that no other thread of the program uses, and as a part of the cycle.
 const OWN_SPIN: (Nanos, u64) = (Nanos::from_micros(300), 3);
 
 /// Choice of the time of busy-waiting: so many wake-ups are tried, and it is longer than all but one of them are late.
