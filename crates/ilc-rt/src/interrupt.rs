@@ -11,6 +11,9 @@ use std::time::{Duration, Instant};
 
 /// Interval at which the caller is asked.
 const ASK_EVERY: Duration = Duration::from_millis(50);
+/// The clock is read at every point, unless they follow each other more quickly than this; then at one of so many.
+const QUICK: Duration = Duration::from_micros(50);
+const ONE_OF: u32 = 64;
 
 thread_local! {
     static CALLER: RefCell<Option<Caller>> = const { RefCell::new(None) };
@@ -19,7 +22,25 @@ thread_local! {
 /// A caller that may cancel.
 struct Caller {
     asked: Instant,
+    /// The last reading of the clock, which takes as long as a sample of a simulation.
+    read: Instant,
+    /// Points that are passed before the next reading.
+    passed: u32,
     is_cancelled: Box<dyn FnMut() -> bool>,
+}
+
+impl Caller {
+    /// Returns true at a point that is due.
+    fn is_due(&mut self) -> bool {
+        if self.passed > 0 {
+            self.passed -= 1;
+            return false;
+        }
+        let now = Instant::now();
+        self.passed = if now.duration_since(self.read) < QUICK { ONE_OF - 1 } else { 0 };
+        self.read = now;
+        now.duration_since(self.asked) >= ASK_EVERY
+    }
 }
 
 /// Payload of the unwinding; no other panic is caught.
@@ -39,7 +60,9 @@ pub fn scope<T>(
     is_cancelled: impl FnMut() -> bool + 'static,
     work: impl FnOnce() -> T,
 ) -> Option<T> {
-    let caller = Caller { asked: Instant::now(), is_cancelled: Box::new(is_cancelled) };
+    let now = Instant::now();
+    let is_cancelled = Box::new(is_cancelled);
+    let caller = Caller { asked: now, read: now, passed: 0, is_cancelled };
     let restore = Restore(CALLER.replace(Some(caller)));
     let ended = catch_unwind(AssertUnwindSafe(work));
     drop(restore);
@@ -59,10 +82,8 @@ pub fn shielded<T>(work: impl FnOnce() -> T) -> T {
 /// Ends the work of the enclosing scope if its caller has cancelled it.
 pub fn point() {
     // The caller runs code of its own when asked, which may open another scope.
-    let due = CALLER.with_borrow(|caller| {
-        caller.as_ref().is_some_and(|caller| caller.asked.elapsed() >= ASK_EVERY)
-    });
-    if !due {
+    let is_due = CALLER.with_borrow_mut(|caller| caller.as_mut().is_some_and(Caller::is_due));
+    if !is_due {
         return;
     }
     let Some(mut caller) = CALLER.take() else { return };
@@ -125,6 +146,24 @@ mod tests {
             },
         );
         assert_eq!(ended, Some("whole"));
+    }
+
+    #[test]
+    fn the_clock_is_read_seldom_between_quick_points_and_always_between_slow_ones() {
+        let now = Instant::now();
+        let mut caller =
+            Caller { asked: now, read: now, passed: 0, is_cancelled: Box::new(|| true) };
+        // As if the last reading had just been made, and long ago.
+        caller.read = Instant::now() + ASK_EVERY;
+        assert!(!caller.is_due());
+        assert_eq!(caller.passed, ONE_OF - 1);
+        caller.asked = now.checked_sub(ASK_EVERY).unwrap();
+        for _ in 1..ONE_OF {
+            assert!(!caller.is_due());
+        }
+        caller.read = now.checked_sub(ASK_EVERY).unwrap();
+        assert!(caller.is_due());
+        assert_eq!(caller.passed, 0);
     }
 
     #[test]
