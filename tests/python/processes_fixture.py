@@ -153,11 +153,11 @@ class Process:
         self._process.send_signal(number)
 
     def end(self, deadline_s: float = DEADLINE_S) -> int:
-        """Read until the program ends, and return its exit status."""
-        until = time.monotonic() + deadline_s
-        while self._next(until, "good-bye") is not None:
+        """Read until the program ends, and return its exit status; it may be silent for so long."""
+        # A busy computer makes a campaign long, not its program silent.
+        while self._next(time.monotonic() + deadline_s, "good-bye") is not None:
             pass
-        return self._process.wait(max(1.0, until - time.monotonic()))
+        return self._process.wait(deadline_s)
 
     def close(self) -> None:
         """Kill the program if it still runs."""

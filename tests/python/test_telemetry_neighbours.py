@@ -39,6 +39,8 @@ signal.pause()
 """
 
 
+# Two campaigns of a minute each on a computer that does thirty other things.
+@pytest.mark.timeout(600)
 def test_a_subscriber_that_stops_reading_holds_nobody_up(bench: Bench) -> None:
     """The campaign ends meanwhile: what exceeds the network's buffers is dropped."""
     runs = 60
