@@ -58,6 +58,8 @@ pub(super) fn still_loop(
     let mut plan = Plan::new(&cell, None, false)?;
     plan.servo.cycle = Nanos::from_micros(cycle_us);
     plan.servo.runs = 0..1;
+    // A computer that stalls is measured to the end: nothing moves that would have to stop.
+    plan.servo.overrun_cycles_max = u32::MAX;
     let counts: Vec<i32> = plan
         .servo
         .axes
@@ -72,4 +74,20 @@ pub(super) fn still_loop(
     let cycle = Cycle::new(Box::new(network), plan.servo, plan.interpolator, loop_side);
     let clock = Arc::clone(clock) as Arc<dyn Clock>;
     Ok(cycle.recorded(clock, cell.realtime.late_share))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::TickStatus;
+
+    #[test]
+    fn a_computer_that_stalls_is_measured_to_the_end() {
+        let clock = Arc::new(MonotonicClock::new(Nanos(0)));
+        let mut cycle = still_loop(&cell(None).unwrap(), 50, &clock).unwrap();
+        cycle.start();
+        for skipped in [0, 1_000_000, 0, 1_000_000, 1_000_000, 0] {
+            assert_eq!(cycle.tick(skipped), TickStatus::Running);
+        }
+    }
 }
