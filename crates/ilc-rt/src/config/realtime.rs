@@ -18,8 +18,8 @@ pub struct Realtime {
     #[schemars(range(min = 0, max = 1023))]
     pub cpu: Option<usize>,
     /// Time before a tick at which the loop stops sleeping and busy-waits; 0 never does. If not given, it is as long as
-    /// wake-ups are late at the start, 20 to 100 us; with a processor of its own up to a third of the cycle, at most
-    /// 300 us.
+    /// wake-ups are late at the start, 20 to 100 us and at most 60 % of the cycle; with a processor of its own up to a
+    /// third of the cycle, at most 300 us.
     #[schemars(range(min = 0, max = 1000))]
     pub spin_us: Option<u32>,
     /// Reaction to a cycle that began at least a whole cycle late.

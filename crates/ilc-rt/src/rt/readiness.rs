@@ -9,6 +9,9 @@ use super::thread::{RtReport, RtRequest, enter};
 const EVERY: Nanos = Nanos::from_micros(200);
 /// Shortest and longest measured time before a tick at which the loop's thread stops sleeping.
 const SPIN_US: (u32, u32) = (20, 100);
+/// The longest as a part of the cycle: a thread that never sleeps is held back by the kernel for 50 ms of a second
+/// in favour of others on its processor.
+const AWAKE: (u64, u64) = (3, 5);
 /// The longest with a processor that no other thread of the program uses, and as a part of the cycle.
 const OWN_SPIN: (Nanos, u64) = (Nanos::from_micros(300), 3);
 
@@ -21,7 +24,8 @@ struct Trial {
 
 impl Trial {
     fn new(request: RtRequest, cycle: Nanos) -> Self {
-        let shared = Nanos::from_micros(SPIN_US.1);
+        let (part, whole) = AWAKE;
+        let shared = Nanos(Nanos::from_micros(SPIN_US.1).0.min(cycle.0 * part / whole));
         if request.cpu.is_none() {
             return Self { wake_ups: 100, longest: shared };
         }
@@ -40,8 +44,8 @@ impl Trial {
             *late_ns = clock.now().since(due).0;
         }
         late_ns.sort_unstable();
-        let least = Nanos::from_micros(SPIN_US.0);
-        Nanos(late_ns[self.wake_ups - 2].clamp(least.0, self.longest.0))
+        let least = Nanos::from_micros(SPIN_US.0).0.min(self.longest.0);
+        Nanos(late_ns[self.wake_ups - 2].clamp(least, self.longest.0))
     }
 }
 
@@ -93,9 +97,17 @@ mod tests {
             let request = RtRequest { cpu, ..RtRequest::default() };
             Trial::new(request, Nanos::from_micros(cycle_us)).longest.0 / 1000
         };
-        assert_eq!([50, 1000, 10_000].map(|cycle_us| longest_us(None, cycle_us)), [100; 3]);
+        let shared = [30, 50, 100, 1000, 10_000].map(|cycle_us| longest_us(None, cycle_us));
+        assert_eq!(shared, [18, 30, 60, 100, 100]);
         let own = [50, 300, 600, 900, 10_000].map(|cycle_us| longest_us(Some(1), cycle_us));
-        assert_eq!(own, [100, 100, 200, 300, 300]);
+        assert_eq!(own, [30, 100, 200, 300, 300]);
+    }
+
+    #[test]
+    fn the_shortest_cycle_is_measured_too() {
+        let request = RtRequest { lock_memory: false, ..RtRequest::default() };
+        let measured = Readiness::probe(request, Nanos::from_micros(20), None).spin;
+        assert_eq!(measured, Nanos(12_000));
     }
 
     #[test]
