@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import border
 import bounded
+import coupled
 import moves
 import prediction
 import update
@@ -44,6 +45,12 @@ def main() -> None:
     ]
     lengths = (400, 1300, 4000)
     lines += table({n: progress(f"N = {n}", update.compare, n) for n in lengths})
+    lines += ["", "Two coupled axes, and two with contour weights along a circle:", ""]
+    lines += table({n: progress(f"coupled, N = {n}", coupled.coupled, n) for n in (1300, 4000)})
+    lines += [""]
+    lines += table(
+        {n: progress(f"contour, N = {n}", coupled.along_a_circle, n) for n in (1300, 4000)}
+    )
     lines += [
         "",
         "## The way from Python and back",

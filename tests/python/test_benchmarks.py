@@ -17,7 +17,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 def report(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     # The comparisons need packages that are not installed where the tests run.
-    for name in ("border", "bounded", "moves", "prediction", "update"):
+    for name in ("border", "bounded", "coupled", "moves", "prediction", "update"):
         monkeypatch.setitem(sys.modules, name, type(sys)(name))
     spec = importlib.util.spec_from_file_location("benchmark_report", FOLDER / "report.py")
     module = importlib.util.module_from_spec(spec)

@@ -183,3 +183,98 @@ impl Sweep for General {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Stage, Stages};
+    use super::*;
+    use nalgebra::DMatrix;
+
+    /// Coupled axes whose weight of the error varies from some sample on.
+    struct Coupled {
+        stage: Stage,
+        n_samples: usize,
+        varies_from: usize,
+    }
+
+    impl Stages for Coupled {
+        fn n_samples(&self) -> usize {
+            self.n_samples
+        }
+
+        fn n_targets(&self) -> usize {
+            self.stage.q.nrows()
+        }
+
+        fn stage(&self, sample: usize) -> Stage {
+            let mut stage = self.stage.clone();
+            stage.q *= if sample < self.varies_from { 1.0 } else { 1.0 + (sample % 5) as f64 };
+            stage
+        }
+
+        fn constant(&self) -> std::ops::Range<usize> {
+            0..self.varies_from
+        }
+
+        fn holds_input(&self) -> bool {
+            self.stage.s[0] > 0.0
+        }
+    }
+
+    fn coupled(n: usize, m: usize, s: f64, varies_from: usize) -> Coupled {
+        let value = |i: usize, j: usize| (((i * 7 + j * 3 + n) as f64) * 1.7).sin();
+        let matrix = |rows, cols, gain: f64| {
+            DMatrix::from_fn(rows, cols, |i, j| gain * value(i + rows, j + cols))
+        };
+        let eye = |gain: f64| DMatrix::identity(m, m) * gain;
+        let (a, b, c) = (matrix(n, n, 0.8 / n as f64), matrix(n, m, 1.0), matrix(m, n, 1.0));
+        let (d, q, s, r) = (eye(0.7), eye(2.0), eye(s), eye(0.1));
+        Coupled { stage: Stage { a, b, c, d, q, s, r }, n_samples: 90, varies_from }
+    }
+
+    #[test]
+    fn sizes_known_at_compile_time_give_the_numbers_of_any() {
+        let mut known = 0;
+        for (m, largest) in [(1, 17), (2, 13), (3, 13), (4, 13), (6, 13)] {
+            for (n, s) in (1..=largest).flat_map(|n| [(n, 0.0), (n, 0.3)]) {
+                let varies_from = if n % 2 == 0 { 0 } else { 60 };
+                known += usize::from(agree(&coupled(n, m, s, varies_from)));
+            }
+        }
+        // Each with a cost of the input and without.
+        assert_eq!(known, 2 * (13 + 12 + 12 + 2 + 1));
+    }
+
+    /// Solves a problem every way, and returns true if its sizes are known at compile time.
+    fn agree(stages: &Coupled) -> bool {
+        let (n_samples, m) = (stages.n_samples, stages.n_targets());
+        // The axes are those from the second on, in another order, among one more.
+        let order: Vec<usize> = (1..=m).rev().collect();
+        let shifts = (0..m).map(|i| i % 3).collect();
+        let channels = Channels { inputs: order.clone(), outputs: order, shifts };
+        let gains = Gains::new(stages, 0).unwrap();
+        let wave = |seed: usize| -> Vec<f64> {
+            (0..(m + 1) * n_samples).map(|k| ((k * k + seed) as f64).sin()).collect()
+        };
+        let (input, error) = (wave(1), wave(2));
+        let mut general = General::new(gains.clone(), channels.clone());
+        let mut solve = |way: &mut dyn FnMut(&mut General, &mut Run) -> bool| {
+            let mut next = vec![0.0; input.len()];
+            let (input, error) = (&input[..], &error[..]);
+            let mut run = Run { input, error, next: &mut next, n_inputs: m + 1, n_outputs: m + 1 };
+            way(&mut general, &mut run).then_some(next)
+        };
+        let mut any = |how: Instructions| {
+            solve(&mut |general, run| {
+                how.run(Solve(general, run));
+                true
+            })
+        };
+        let best = any(Instructions::best());
+        assert!(best.is_some() && best == any(Instructions::Portable), "{m} axes");
+        let fixed =
+            solve(&mut |general, run| fixed::solve(&gains, &channels, &mut general.kappa, run));
+        assert!(fixed.is_none() || fixed == best, "{} states, {m} axes", gains.n_states());
+        fixed.is_some()
+    }
+}
