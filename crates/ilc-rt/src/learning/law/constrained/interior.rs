@@ -8,7 +8,7 @@ use super::solver::{Bands, Outcome, Places, Solver};
 use crate::learning::sweep::Run;
 
 /// Duality gap at which the search ends, relative to the cost ...
-const GAP: f64 = 1e-13;
+const GAP: f64 = 3e-14;
 /// ... and the accepted one if rounding prevents a smaller one.
 const GAP_ENOUGH: f64 = 1e-9;
 /// An iteration that reduces the gap by less than this factor is limited by rounding.
@@ -33,8 +33,8 @@ const CENTRING: f64 = 0.3;
 /// centring steps are taken.
 const LOST: usize = 8;
 /// Initial sum of the products of slack and multiplier, relative to the cost before learning (cold
-/// start) ...
-const START: f64 = 0.3;
+/// start): large ones leave the search room among many active bounds, in half of the iterations ...
+const START: f64 = 30.0;
 /// ... and for a warm start from an earlier solution.
 const WARM_START: f64 = 0.1;
 

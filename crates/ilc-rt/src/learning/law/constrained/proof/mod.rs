@@ -303,7 +303,11 @@ fn starting_from_the_last_solution_is_faster_and_as_good() {
         }
         std::mem::swap(&mut input, &mut next);
     }
-    assert!(counts[2..].iter().all(|(warm, cold)| warm < cold), "{counts:?}");
+    let (warm, cold) = counts[2..].iter().fold((0, 0), |sums, (warm, cold)| {
+        assert!(warm <= cold, "{counts:?}");
+        (sums.0 + warm, sums.1 + cold)
+    });
+    assert!(10 * warm <= 9 * cold, "{counts:?}");
 }
 
 #[test]
