@@ -59,7 +59,7 @@ class Library(Closing, _native.Library):
     _path: str
 
     def __new__(cls, path: str | PathLike[str]) -> Self:
-        library = super().__new__(cls, path=fspath(path))
+        library = super().__new__(cls, {"path": fspath(path)})
         library._path = fspath(path)
         return library
 
@@ -338,7 +338,7 @@ class Library(Closing, _native.Library):
         >>> library.recall(20.0)[0]["distance"]
         1.5
         """
-        return super()._append(**given(locals()))
+        return super()._append(given(locals()))
 
     def trim(self, keep: int, cell: str | None = None, *, progress: Progress | None = None) -> int:
         """Delete all but the most relevant runs, and return how many were deleted.

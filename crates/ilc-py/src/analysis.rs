@@ -16,16 +16,15 @@ use pyo3::types::PyDict;
 
 use crate::answer::{ByName, by_name, give_signal, give_vector};
 use crate::argument::{Signal, misfit, read_array, read_vector};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::laws;
 use crate::python_law::Channels;
 use crate::whole::number;
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn analyze<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn analyze<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let model = a.model("model")?;
     let law = a.get("law")?;
     let given = a.maybe_whole("n_samples")?;
@@ -87,9 +86,8 @@ fn figures<'py>(py: Python<'py>, found: &Analysis, model: &StateSpace) -> ByName
     ))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn refuse_divergent(keywords: Option<Keywords<'_, '_>>) -> PyResult<()> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn refuse_divergent(a: Arguments<'_, '_>) -> PyResult<()> {
     let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
     let law = a.get("law")?;
     if laws::is_python(&law)? {
@@ -168,9 +166,8 @@ fn read_law(
     laws::apart("law", object, n_samples, channels(model), 0)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn tune<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn tune<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
     let knowledge = Knowledge {
         uncertainty: read_uncertainty(a)?,

@@ -8,7 +8,7 @@ use pyo3::types::PyList;
 
 use crate::answer::{Array, give_matrices, give_signal, give_vector};
 use crate::argument::{Signal, misfit, read_vector};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::made::{Made, New, made};
@@ -21,9 +21,7 @@ pub(crate) struct PyLine(Line);
 #[pymethods]
 impl PyLine {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let point = |name: &str| read_point(name, &a.get(name)?);
         made(a, Self(Line { from_m: point("from_m")?, to_m: point("to_m")? }))
     }
@@ -36,9 +34,7 @@ pub(crate) struct PyArc(Arc);
 #[pymethods]
 impl PyArc {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let point = |name: &str| read_point(name, &a.get(name)?);
         let axis = a.maybe("axis", read_point)?.unwrap_or([0.0, 0.0, 1.0]);
         let arc = Arc::new(point("from_m")?, point("centre_m")?, axis, a.number("sweep_rad")?);

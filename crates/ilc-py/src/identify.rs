@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, ByName, by_name, give_vector};
 use crate::argument::read_vector;
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::experiment::read_waveform;
@@ -52,21 +52,18 @@ pub(crate) fn give_measured(py: Python<'_>, measured: FrequencyResponse) -> ByNa
     ))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn check_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn check_response<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     give_measured(a.py(), read_measured(a)?)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn relative_deviation<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn relative_deviation<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     Ok(give_vector(a.py(), read_measured(a)?.relative_deviation()))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn frequency_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn frequency_response<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (u, y, dt_s) = (a.vector("u")?, a.vector("y")?, a.number("dt_s")?);
     let overlap_samples = a.maybe_whole("overlap_samples")?;
     let averaging = match (a.maybe_whole("period_samples")?, a.maybe_whole("segment_samples")?) {
@@ -85,9 +82,8 @@ pub(crate) fn frequency_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> By
     give_measured(a.py(), found.or_raise()?)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn fit_second_order<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn fit_second_order<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
     let known = Known { gain: a.maybe_number("gain")?, delay_s: a.maybe_number("delay_s")? };
     let fit = interruptible(a.py(), || identify::fit_second_order(&measured, dt_s, known))?;
@@ -114,24 +110,22 @@ fn read_second_order(a: Arguments<'_, '_>) -> PyResult<SecondOrder> {
     })
 }
 
-#[pyfunction(signature = (frequency_hz, /, **model))]
+#[pyfunction]
 pub(crate) fn second_order_response<'py>(
     frequency_hz: &Bound<'py, PyAny>,
-    model: Option<Keywords<'_, 'py>>,
+    a: Arguments<'_, 'py>,
 ) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
-    let a = Arguments::of(model)?;
     Ok(give_vector(a.py(), read_second_order(a)?.response(&frequency_hz)))
 }
 
-#[pyfunction(signature = (**model))]
-pub(crate) fn second_order_model(model: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    read_second_order(Arguments::of(model)?)?.state_space().or_raise().map(PyStateSpace::from)
+#[pyfunction]
+pub(crate) fn second_order_model(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
+    read_second_order(a)?.state_space().or_raise().map(PyStateSpace::from)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn fit_velocity_loop<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn fit_velocity_loop<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (measured, gain_per_s) = (read_measured(a)?, a.number("position_gain_per_s")?);
     let (dt_s, delay_s) = (a.number("dt_s")?, a.maybe_number("delay_s")?);
     let fit = || identify::fit_velocity_loop(&measured, gain_per_s, dt_s, delay_s);
@@ -147,13 +141,12 @@ pub(crate) fn give_velocity_loop<'py>(py: Python<'py>, fit: &VelocityLoopFit) ->
     ))
 }
 
-#[pyfunction(signature = (frequency_hz, /, **model))]
+#[pyfunction]
 pub(crate) fn velocity_loop_response<'py>(
     frequency_hz: &Bound<'py, PyAny>,
-    model: Option<Keywords<'_, 'py>>,
+    a: Arguments<'_, 'py>,
 ) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
-    let a = Arguments::of(model)?;
     let model = VelocityLoop {
         gain: a.number("gain")?,
         bandwidth_hz: a.number("bandwidth_hz")?,
@@ -164,9 +157,8 @@ pub(crate) fn velocity_loop_response<'py>(
     Ok(give_vector(a.py(), model.response(&frequency_hz)))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn fit_rational<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn fit_rational<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (n_zeros, n_poles) = (a.whole("n_zeros")?, a.whole("n_poles")?);
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
     let delay_s = a.number("delay_s")?;
@@ -179,19 +171,17 @@ pub(crate) fn fit_rational<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'
 /// Frequencies and bounds.
 type Bounds<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn uncertainty<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bounds<'py>> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn uncertainty<'py>(a: Arguments<'_, 'py>) -> PyResult<Bounds<'py>> {
     let (measured, model) = (read_measured(a)?, read_complex("model", &a.get("model")?)?);
     let found = identify::uncertainty(&measured, &model, a.number("deviations")?).or_raise()?;
     Ok((give_vector(a.py(), found.frequency_hz), give_vector(a.py(), found.bound)))
 }
 
-#[pyfunction(signature = (**keywords))]
+#[pyfunction]
 pub(crate) fn excitation<'py>(
-    keywords: Option<Keywords<'_, 'py>>,
+    a: Arguments<'_, 'py>,
 ) -> PyResult<(Bound<'py, PyAny>, usize, usize)> {
-    let a = Arguments::of(keywords)?;
     let dt_s = a.number("dt_s")?;
     let excitation = Excitation {
         waveform: read_waveform(&a.text("waveform")?)?,

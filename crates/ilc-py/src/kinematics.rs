@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, give_matrices, give_matrix, give_signal};
 use crate::argument::{Matrix, Signal, misfit};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::error::OrRaise;
 use crate::exceptions;
 use crate::made::{Made, New, made};
@@ -28,9 +28,7 @@ pub(crate) struct PyDelta {
 #[pymethods]
 impl PyDelta {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let (base_m, crank_m, rod_m) =
             (a.number("base_m")?, a.number("crank_m")?, a.number("rod_m")?);
         let delta = Delta::new(base_m, crank_m, rod_m).or_raise()?;
@@ -88,9 +86,7 @@ pub(crate) struct PyGantry {
 #[pymethods]
 impl PyGantry {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let orthogonality_rad = a.number("orthogonality_rad")?;
         let gantry = Gantry::new(orthogonality_rad).or_raise()?;
         made(a, Self { gantry, orthogonality_rad })

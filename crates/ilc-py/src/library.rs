@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyIterator};
 
 use crate::answer::{ByName, by_name, give_signal, give_vector};
 use crate::argument::{Signal, read_disturbance};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::library_rows::{Raised, give_row, next_row};
@@ -34,9 +34,7 @@ enum Held {
 #[pymethods]
 impl PyLibrary {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let path: PathBuf = a.get("path")?.extract()?;
         if path.as_os_str() == ":memory:" {
             let library = Library::in_memory().or_raise()?;
@@ -157,9 +155,7 @@ impl PyLibrary {
     }
 
     /// Store a run that was made elsewhere.
-    #[pyo3(signature = (**keywords))]
-    fn _append(&self, py: Python<'_>, keywords: Option<Keywords<'_, '_>>) -> PyResult<i64> {
-        let a = Arguments::of(keywords)?;
+    fn _append(&self, py: Python<'_>, a: Arguments<'_, '_>) -> PyResult<i64> {
         let u = a.signal("u")?;
         let alike = |name: &str, signal: &Bound<'_, PyAny>| {
             let signal = Signal::read(name, signal)?;

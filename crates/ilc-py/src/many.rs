@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{ByName, by_name, give_vector};
 use crate::argument::{read_disturbance, read_vector};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::laws::apart;
@@ -15,9 +15,8 @@ use crate::model_argument::read_model;
 use crate::python_law::Channels;
 use crate::whole::{each, whole};
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn simulate_many<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn simulate_many<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let list = |name: &str, read: fn(&str, &Bound<'py, PyAny>) -> PyResult<Vec<f64>>| {
         each(name, &a.get(name)?, "a list of arrays", |one| read(name, one))
     };

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, give_matrices, give_matrix, give_signal, give_vector};
 use crate::argument::{Signal, read_matrix, read_vector};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
@@ -387,24 +387,21 @@ impl PyStateSpace {
     }
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn from_transfer_function(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn from_transfer_function(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let dt_s = a.maybe("dt_s", read_sample_time)?.flatten();
     let (num, den) = (a.vector("num")?, a.vector("den")?);
     give(model::from_transfer_function(&num, &den, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn second_order(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn second_order(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let (w0, damping) = (a.number("natural_frequency_rad_s")?, a.number("damping")?);
     give(model::second_order(w0, damping))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn discretize(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn discretize(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let methods = [("zoh", Method::ZeroOrderHold), ("tustin", Method::Tustin)];
     let (model, dt_s) = (a.model("model")?, a.number("dt_s")?);
     let method = a.choice("method", &methods)?;

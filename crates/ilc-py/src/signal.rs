@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyString};
 
 use crate::answer::{Array, ByName, give_signal, give_vector};
 use crate::argument::{Layout, Signal, read_vector};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
@@ -29,10 +29,8 @@ pub(crate) struct PyFilter {
 #[pymethods]
 impl PyFilter {
     #[new]
-    #[pyo3(signature = (kind, /, **arguments))]
-    fn new(py: Python<'_>, kind: String, arguments: Option<Keywords<'_, '_>>) -> PyResult<Self> {
-        let none = PyDict::new(py);
-        let kept = Arguments::new(arguments.unwrap_or(&none)).kept()?;
+    fn new(kind: String, arguments: Arguments<'_, '_>) -> PyResult<Self> {
+        let kept = arguments.kept()?;
         let a = Arguments::new(&kept);
         let filter = match kind.as_str() {
             "butterworth" => {
@@ -224,9 +222,8 @@ pub(crate) fn zero_phase<'py>(filter: &Bound<'py, PyAny>, x: &Bound<'py, PyAny>)
     filtered(&without_lag(&read_filter("filter", Some(filter))?), x)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn instantaneous_frequency<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn instantaneous_frequency<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (x, dt_s) = (a.vector("x")?, a.number("dt_s")?);
     let found = detached(a.py(), || signal::instantaneous_frequency(&x, dt_s)).or_raise()?;
     Ok(give_vector(a.py(), found))

@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{ByName, by_name, give_signal};
 use crate::argument::read_vector;
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::exceptions;
@@ -157,9 +157,8 @@ fn sample_run(curve: &impl Curve, limits: &RunLimits, dt_s: f64) -> Planned {
     Ok((Run::plan(curve, limits, dt_s)?.motion().clone(), Vec::new()))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn jerk_limited<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn jerk_limited<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, points.len() - 1)?;
     let limits = read_limits(a, points[0].len())?;
@@ -170,9 +169,8 @@ pub(crate) fn jerk_limited<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'
     planned(a.py(), || sample_linear(&points[0], &segments, &limits, setting, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn exponential_sigmoid<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let n_legs = points.len() - 1;
     let each = |name: &str| match a.given(name)? {
@@ -197,9 +195,8 @@ pub(crate) fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> B
     planned(a.py(), || sample_exponential(&points[0], &segments, &limits, &alpha_max, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn modulated<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn modulated<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let [start, end] = &points[..] else {
         return Err(PyValueError::new_err(format!(
@@ -228,9 +225,8 @@ pub(crate) fn modulated<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py>
     }
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn sigmoid_pair<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn sigmoid_pair<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (velocity, amplitude) = (a.pair("velocity_m_s")?, a.pair("amplitude_m")?);
     let (omega, phase_zero) = (a.pair("omega_rad_s")?, a.pair("phase_zero_s")?);
     let pair = Listing {
@@ -250,35 +246,31 @@ pub(crate) fn sigmoid_pair<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'
     planned(a.py(), || Ok((pair.sample(duration_s, dt_s)?, Vec::new())))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn spline<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn spline<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let limits = read_run_limits(a, points[0].len())?;
     planned(a.py(), || sample_run(&Spline::through(&points)?, &limits, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn butterfly<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn butterfly<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
     let (scale_m, turns) = (a.number("scale_m")?, a.number("turns")?);
     let center = read_place(a, "center_m")?;
     planned(a.py(), || sample_run(&Butterfly::new(scale_m, turns, center)?, &limits, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn spiral<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn spiral<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
     let (pitch_m, turns) = (a.number("pitch_m")?, a.number("turns")?);
     let center = read_place(a, "center_m")?;
     planned(a.py(), || sample_run(&Spiral::new(pitch_m, turns, center)?, &limits, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn raster<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (limits, start, dt_s) = (read_limits(a, 2)?, read_place(a, "start_m")?, a.number("dt_s")?);
     let raster = RasterSection {
         width_m: a.number("width_m")?,
@@ -294,9 +286,8 @@ pub(crate) fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     })
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn gcode<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let text = a.get("text")?;
     let bytes = match text.extract::<&[u8]>() {
         Ok(bytes) => bytes,
@@ -325,9 +316,8 @@ pub(crate) fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     planned(a.py(), || Ok((SampledMotion::of_path(&spec, &limits, dt_s)?, Vec::new())))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn tracking_index(keywords: Option<Keywords<'_, '_>>) -> PyResult<(f64, f64)> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn tracking_index(a: Arguments<'_, '_>) -> PyResult<(f64, f64)> {
     let programmed = a.signal("programmed_m")?;
     let gains = (a.number("k_e")?, a.number("k_a")?);
     let index = TrackingIndex::of(

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, give_matrices, give_signal, give_vector};
 use crate::argument::{Matrix, misfit, read_array};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
@@ -135,16 +135,14 @@ fn read_formation(a: Arguments<'_, '_>, n_agents: usize, n_axes: usize) -> PyRes
     Formation::of_pairs(n_agents, n_axes, &pairs, &axes).or_raise()
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn contour_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn contour_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (weight, n_samples, p) = read_contour(a)?;
     give_blocks(a.py(), &weight, n_samples, p)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn coupled_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn coupled_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let matrices = read_matrices("coupling", &a.get("coupling")?)?;
     let (n_samples, p) = (matrices.len(), matrices[0].ncols());
     let shares = Coupled {
@@ -155,9 +153,8 @@ pub(crate) fn coupled_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array
     give_blocks(a.py(), &weight, n_samples, p)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn schedule<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn schedule<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let n_samples = a.whole("n_samples")?;
     let steps = Schedule::new(&read_segments(&a.get("segments")?)?).or_raise()?;
     let schedule = match (a.maybe_number("bandwidth_hz")?, a.maybe_number("dt_s")?) {
@@ -185,18 +182,16 @@ fn read_segments(object: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
     })
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn formation_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn formation_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (n_agents, n_axes) = (a.whole("n_agents")?, a.whole("n_axes")?);
     let n_samples = a.whole("n_samples")?;
     let weight = read_formation_weight(a, n_samples, n_agents, n_axes)?;
     give_blocks(a.py(), &weight, n_samples, n_agents * n_axes)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn formation_errors<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn formation_errors<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (e, n_agents) = (a.signal("e")?, a.whole("n_agents")?);
     if n_agents == 0 || !e.n_channels.is_multiple_of(n_agents) {
         let rule = format!("(n_samples, n_axes of {n_agents} agents)");
@@ -208,9 +203,8 @@ pub(crate) fn formation_errors<'py>(keywords: Option<Keywords<'_, 'py>>) -> Arra
     give_signal(a.py(), values, rows, false)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn band_filter(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn band_filter(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let pass = a.choice("passes", &[("low", Pass::Low), ("high", Pass::High)])?;
     let shape = (a.whole("order")?, a.number("cutoff_hz")?);
     let filter = band(pass, shape, a.number("dt_s")?, a.whole("n_channels")?);

@@ -106,6 +106,22 @@ pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
     })
 }
 
+/// Refuses a number that is not finite.
+pub(crate) fn finite(name: &str, value: f64) -> PyResult<f64> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    Err(PyValueError::new_err(format!("{name} = {value}; only finite numbers are allowed")))
+}
+
+/// Refuses a number that is not finite and above 0.
+pub(crate) fn positive(name: &str, value: f64) -> PyResult<f64> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(PyValueError::new_err(format!("{name} = {value}; it must be finite and above 0")))
+}
+
 /// A number without a name of its own, within the range of a float.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Real(pub(crate) f64);

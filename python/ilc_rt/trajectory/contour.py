@@ -43,7 +43,7 @@ class Line(_native.Line):
         from_m: ArrayLike,
         to_m: ArrayLike,
     ) -> Self:
-        return super().__new__(cls, from_m=from_m, to_m=to_m)
+        return super().__new__(cls, given(locals()))
 
 
 class Arc(_native.Arc):
@@ -81,7 +81,7 @@ class Arc(_native.Arc):
         sweep_rad: float,
         axis: ArrayLike | None = None,
     ) -> Self:
-        return super().__new__(cls, **given(locals()))
+        return super().__new__(cls, given(locals()))
 
 
 def contour_error(

@@ -16,20 +16,20 @@ mod research;
 
 use std::sync::Arc;
 
-use ilc_rt::learning::Law;
 use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answer::{Array, ByName};
 use crate::argument::{Layout, read_disturbance};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
 use crate::made::reduce_kind;
 use crate::python_law::{Channels, Frame, PythonLaw};
-use crate::signal::read_filter;
 use crate::whole::whole;
 pub(crate) use apart::{apart, is_python, samples_of};
 use exchange::{Copies, Given, Signals};
@@ -102,7 +102,7 @@ impl<'py> Call<'_, 'py> {
 
     /// Returns the Q-filter of a law; a single sample is too short for any.
     fn filter(&self, name: &str) -> PyResult<QFilter> {
-        let filter = read_filter(name, self.arguments.given(name)?.as_ref())?;
+        let filter = self.arguments.filter(name)?;
         Ok(if self.size.is_some() { filter } else { QFilter::None })
     }
 
@@ -115,12 +115,28 @@ impl<'py> Call<'_, 'py> {
         let Size { n_samples, n_disturbances, .. } = self.size();
         apart(name, &object, n_samples, channels, n_disturbances)
     }
+
+    /// Builds a law while other Python threads run.
+    fn built<L: Readable + 'static>(
+        &self,
+        fits: Fits,
+        build: impl FnOnce() -> Result<L, LearningError> + Send,
+    ) -> PyResult<Built> {
+        Built::of(fits, interruptible(self.py(), build)?)
+    }
 }
 
 /// A law and the runs it accepts.
 struct Built {
     law: Box<dyn Readable>,
     fits: Fits,
+}
+
+impl Built {
+    /// Returns a new law, or raises its refusal.
+    fn of(fits: Fits, law: Result<impl Readable + 'static, LearningError>) -> PyResult<Self> {
+        Ok(Self { law: Box::new(law.or_raise()?), fits })
+    }
 }
 
 /// A learning law of the controller, of any kind.
@@ -148,16 +164,14 @@ struct State {
 #[pymethods]
 impl PyLaw {
     #[new]
-    #[pyo3(signature = (kind, /, **arguments))]
-    fn new(py: Python<'_>, kind: &str, arguments: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(kind: &str, arguments: Arguments<'_, '_>) -> PyResult<Self> {
         let mut builders = BUILDERS.into_iter().flatten().copied();
         let Some((kind, build)) = builders.find(|(name, _)| *name == kind) else {
             let kinds: Vec<&str> = BUILDERS.into_iter().flatten().map(|(name, _)| *name).collect();
             let line = format!("kind = '{kind}'; one of {} is needed", kinds.join(", "));
             return Err(PyValueError::new_err(line));
         };
-        let none = PyDict::new(py);
-        let kept = Arguments::new(arguments.unwrap_or(&none)).kept()?;
+        let kept = arguments.kept()?;
         let frame = Arc::new(Frame::default());
         let call = Call { arguments: Arguments::new(&kept), size: None, live: Some(&frame) };
         let Built { law, fits } = build(&call)?;

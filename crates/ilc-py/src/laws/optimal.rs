@@ -8,7 +8,7 @@ use ilc_rt::model::StateSpace;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::figure::Figure;
+use super::figure::readable;
 use super::{Builder, Built, Call, Fits, Readable};
 use crate::argument::{Matrix, misfit};
 use crate::arguments::Arguments;
@@ -28,6 +28,9 @@ pub(super) const BUILDERS: &[Builder] = &[
 
 /// The kinds that are class methods of `NormOptimalIlc`.
 pub(super) const METHODS: [&str; 3] = ["contour", "formation", "dynamic"];
+
+readable! { NormOptimal as law => conditioning: Number(law.conditioning()); }
+readable! { DynamicNormOptimal as law => conditioning: Number(law.inner().conditioning()); }
 
 pub(super) fn plain(call: &Call<'_, '_>) -> PyResult<Built> {
     let model = read_any_model("model", &call.arguments.get("model")?)?;
@@ -80,13 +83,8 @@ fn build(
     q: Weight,
     filters: Option<(&Dynamic, &InputWeights)>,
 ) -> PyResult<Built> {
-    let a = call.arguments;
     let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
-    let (s, r) = (
-        a.weight("s", n_samples, channels.n_inputs)?,
-        a.weight("r", n_samples, channels.n_inputs)?,
-    );
-    let cost = Cost { q, s, r, rate: a.number("rate")? };
+    let cost = read_cost(call.arguments, q, n_samples, channels.n_inputs)?;
     let law = interruptible(call.py(), || -> Result<Box<dyn Readable>, LearningError> {
         let plant = model.plant();
         Ok(match filters {
@@ -99,16 +97,15 @@ fn build(
     Ok(Built { law: law.or_raise()?, fits: Fits::Fixed(n_samples, channels) })
 }
 
-impl Readable for NormOptimal {
-    fn figure(&self, name: &str) -> Option<Figure> {
-        (name == "conditioning").then(|| Figure::Number(self.conditioning()))
-    }
-}
-
-impl Readable for DynamicNormOptimal {
-    fn figure(&self, name: &str) -> Option<Figure> {
-        self.inner().figure(name)
-    }
+/// Reads the weights of input, change and rate, in addition to that of the error.
+pub(super) fn read_cost(
+    a: Arguments<'_, '_>,
+    q: Weight,
+    n_samples: usize,
+    n_inputs: usize,
+) -> PyResult<Cost> {
+    let input = |name| a.weight(name, n_samples, n_inputs);
+    Ok(Cost { q, s: input("s")?, r: input("r")?, rate: a.number("rate")? })
 }
 
 /// Reads the filter of the error, by default none, its coupling and the weight of the unfiltered error.
