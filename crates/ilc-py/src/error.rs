@@ -31,6 +31,7 @@ raise! {
     model::ModelError => exceptions::ModelError,
     signal::SignalError => exceptions::SignalError,
     trajectory::TrajectoryError => exceptions::TrajectoryError,
+    trajectory::program::GcodeError => exceptions::TrajectoryError,
     kinematics::KinematicsError => exceptions::KinematicsError,
     contour::ContourError => exceptions::ContourError,
     library::LibraryError => PyOSError,
