@@ -17,7 +17,7 @@ use pyo3::types::PyDict;
 use crate::answer::{ByName, by_name, give_signal, give_vector};
 use crate::argument::{Signal, misfit, read_array, read_vector};
 use crate::arguments::Arguments;
-use crate::detached::interruptible;
+use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::laws;
 use crate::python_law::Channels;
@@ -49,9 +49,8 @@ pub(crate) fn analyze<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
         n_runs: a.whole("n_runs")?,
     };
     let mut law = read_law(&law, &model, n_samples)?;
-    let found =
-        interruptible(a.py(), || analysis::analyze(law.as_mut(), &model, n_samples, &question))?;
-    figures(a.py(), &found.or_raise()?, &model)
+    let found = computed(a.py(), || analysis::analyze(law.as_mut(), &model, n_samples, &question))?;
+    figures(a.py(), &found, &model)
 }
 
 /// Returns the figures of an analysis by the names of `ilc_rt.Analysis`.
@@ -94,11 +93,11 @@ pub(crate) fn refuse_divergent(a: Arguments<'_, '_>) -> PyResult<()> {
         return Ok(());
     }
     let mut law = laws::apart("law", &law, n_samples, channels(&model), 0)?;
-    let found = interruptible(a.py(), || {
+    let found = computed(a.py(), || {
         analysis::refuse_divergent(law.as_mut(), &model, n_samples)?;
         analysis::overreach(law.as_mut(), &model, n_samples)
     })?;
-    let Some(found) = found.or_raise()? else { return Ok(()) };
+    let Some(found) = found else { return Ok(()) };
     let message = CString::new(found.to_string())?;
     PyErr::warn(a.py(), &a.py().get_type::<PyUserWarning>(), &message, 2)
 }
@@ -175,7 +174,7 @@ pub(crate) fn tune<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
         reference: read_reference(a, &model, Some(n_samples))?.map(|found| found.values),
         n_runs: a.whole("n_runs")?,
     };
-    let found = interruptible(a.py(), || propose(&model, n_samples, &knowledge))?.or_raise()?;
+    let found = computed(a.py(), || propose(&model, n_samples, &knowledge))?;
     let analysis = figures(a.py(), &found.analysis, &model)?;
     let step = |step: &TuningStep| -> ByName<'py> {
         let value = Some(step.value).filter(|value| value.is_finite());
@@ -198,9 +197,7 @@ pub(crate) fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> ByName<'py> {
         }
     };
     let is_flat = shape.len() == 2;
-    let found =
-        interruptible(py, || learning::repeatability(&values, count, n_samples, n_channels))?
-            .or_raise()?;
+    let found = computed(py, || learning::repeatability(&values, count, n_samples, n_channels))?;
     Ok(by_name!(py,
         [found => mean_rms, spread_rms, ratio, learnable, least_rms, largest_rms]
         mean: give_signal(py, found.mean, n_channels, is_flat)?,

@@ -33,19 +33,13 @@ impl Layout {
 
     /// Refuses any other number of samples.
     pub(crate) fn require_samples(self, name: &str, n_samples: usize) -> PyResult<()> {
-        if self.n_samples == n_samples {
-            return Ok(());
-        }
-        let rule = format!("({n_samples},) or ({n_samples}, n_channels)");
-        Err(misfit(name, &self.shape(), &rule))
+        let rule = || format!("({n_samples},) or ({n_samples}, n_channels)");
+        self.require(name, self.n_samples == n_samples, rule)
     }
 
     /// Refuses any other number of channels.
     pub(crate) fn require_channels(self, name: &str, n_channels: usize) -> PyResult<()> {
-        if self.n_channels == n_channels {
-            return Ok(());
-        }
-        Err(misfit(name, &self.shape(), &format!("(n_samples, {n_channels})")))
+        self.require(name, self.n_channels == n_channels, || format!("(n_samples, {n_channels})"))
     }
 
     /// Refuses any other size.
@@ -55,10 +49,12 @@ impl Layout {
         n_samples: usize,
         n_channels: usize,
     ) -> PyResult<()> {
-        if (self.n_samples, self.n_channels) == (n_samples, n_channels) {
-            return Ok(());
-        }
-        Err(misfit(name, &self.shape(), &format!("({n_samples}, {n_channels})")))
+        let fits = (self.n_samples, self.n_channels) == (n_samples, n_channels);
+        self.require(name, fits, || format!("({n_samples}, {n_channels})"))
+    }
+
+    fn require(self, name: &str, fits: bool, rule: impl FnOnce() -> String) -> PyResult<()> {
+        if fits { Ok(()) } else { Err(misfit(name, &self.shape(), &rule())) }
     }
 
     /// Returns the original shape.

@@ -8,12 +8,9 @@ use std::time::Duration;
 
 use ilc_rt::campaign::{self, CampaignError, Disturbance, Options};
 use ilc_rt::cli::{IdentifyOptions, described, parse};
-use ilc_rt::config::Cell;
-use ilc_rt::fieldbus::Bus;
-use ilc_rt::fieldbus::transport::{self, GroupSide, in_process};
+use ilc_rt::fieldbus::transport;
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
-use ilc_sim::machine::{ClockMode, Machine};
 use pyo3::exceptions::{PyBaseException, PyValueError};
 use pyo3::prelude::*;
 
@@ -23,8 +20,6 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::python_law::{Channels, Frame, PythonLaw};
 
-/// Capacity of the in-process bus towards the loop, in frames.
-const LOOPBACK_FRAMES: usize = 1024;
 /// Capacity of events towards Python; a full queue makes the campaign wait.
 const EVENTS: usize = 64;
 /// Interval at which a waiting `next` checks for signals.
@@ -155,7 +150,7 @@ pub(crate) fn run_events(
     let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
         let mut cell = cell;
         cell.bus.address = address;
-        let bus = open(&cell)?;
+        let bus = ilc_sim::bus::open(&cell)?;
         let mut send = |event: &Event| {
             if let Ok(text) = serde_json::to_string(event) {
                 let _ = sender.send(text);
@@ -187,7 +182,7 @@ impl Work {
         let parsed = match verb {
             "run" => parse(arguments).map(Self::Run),
             "identify" => parse(arguments).map(Self::Identify),
-            _ => Err(format!("verb = '{verb}': 'run' or 'identify' is allowed")),
+            _ => Err(no_verb(verb)),
         };
         parsed.map_err(PyValueError::new_err)
     }
@@ -210,12 +205,13 @@ pub(crate) fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {
         "run" => described::<Options>(),
         "identify" => described::<IdentifyOptions>(),
-        _ => {
-            let line = format!("verb = '{verb}': 'run' or 'identify' is allowed");
-            return Err(PyValueError::new_err(line));
-        }
+        _ => return Err(PyValueError::new_err(no_verb(verb))),
     };
     serde_json::to_string(&options).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+fn no_verb(verb: &str) -> String {
+    format!("verb = '{verb}': 'run' or 'identify' is allowed")
 }
 
 /// Returns a source of disturbances that calls a Python function.
@@ -227,18 +223,4 @@ fn measured(ask: Py<PyAny>) -> Disturbance {
         })
         .map_err(|error: PyErr| error.to_string().replace('\n', " "))
     })
-}
-
-fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
-    let file = cell.file.display().to_string();
-    if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
-        return campaign::open_buses(cell, GroupSide::Controller)
-            .map_err(|(place, source)| CampaignError::Bus { place, source });
-    }
-    match Machine::from_cell(cell, ClockMode::LockStep) {
-        Ok(machine) => {
-            Ok(in_process(&cell.bus.address, machine, cell.cell.cycle_us, LOOPBACK_FRAMES))
-        }
-        Err(error) => Err(CampaignError::Simulation { file, reason: error.to_string() }),
-    }
 }

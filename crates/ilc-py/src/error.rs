@@ -16,12 +16,28 @@ pub(crate) trait OrRaise<T> {
     fn or_raise(self) -> PyResult<T>;
 }
 
+/// An exception, where an error of `ilc-rt` may come as well.
+#[derive(Debug)]
+pub(crate) struct Raised(pub(crate) PyErr);
+
+impl<T> OrRaise<T> for Result<T, Raised> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|Raised(error)| error)
+    }
+}
+
 /// Maps the errors of a module to an exception.
 macro_rules! raise {
     ($($error:ty => $exception:ty),* $(,)?) => {
         $(impl<T> OrRaise<T> for Result<T, $error> {
             fn or_raise(self) -> PyResult<T> {
-                self.map_err(|error| <$exception>::new_err(error.to_string()))
+                self.map_err(|error| Raised::from(error).0)
+            }
+        }
+
+        impl From<$error> for Raised {
+            fn from(error: $error) -> Self {
+                Self(<$exception>::new_err(error.to_string()))
             }
         })*
     };
@@ -53,12 +69,18 @@ impl<T> OrRaise<T> for Result<T, learning::LearningError> {
     }
 }
 
-impl<T> OrRaise<T> for Result<T, identification::IdentificationError> {
-    fn or_raise(self) -> PyResult<T> {
+impl From<identification::IdentificationError> for Raised {
+    fn from(error: identification::IdentificationError) -> Self {
         use identification::IdentificationError::Model;
-        self.map_err(|error| match error {
+        Self(match error {
             Model { .. } => exceptions::ModelError::new_err(error.to_string()),
             error => PyValueError::new_err(error.to_string()),
         })
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, identification::IdentificationError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(Raised::from).or_raise()
     }
 }

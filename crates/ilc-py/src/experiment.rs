@@ -3,8 +3,7 @@
 
 use ilc_rt::cli::parse;
 use ilc_rt::identification::{
-    self, Described, Experiment, ExperimentOptions, Form, IdentificationError, Identified, Signals,
-    waveform_name,
+    self, Described, Experiment, ExperimentOptions, Form, Identified, Signals, waveform_name,
 };
 use ilc_rt::model::identify::{Doubt, Waveform};
 use pyo3::exceptions::PyValueError;
@@ -13,8 +12,8 @@ use pyo3::prelude::*;
 use crate::answer::{ByName, by_name, give_vector};
 use crate::argument::read_vector;
 use crate::cell::PyCell;
-use crate::detached::interruptible;
-use crate::error::OrRaise;
+use crate::detached::computed;
+use crate::error::{OrRaise, Raised};
 use crate::identify::{give_measured, give_second_order, give_velocity_loop};
 use crate::whole::{Real, whole};
 
@@ -25,18 +24,6 @@ pub(crate) fn read_waveform(name: &str) -> PyResult<Waveform> {
             "waveform = '{name}'; 'sweep', 'linear-sweep' or 'multisine' is needed"
         ))
     })
-}
-
-/// Failure of an identification: refused, or raised by the function that executes the experiments.
-enum Failure {
-    Refused(IdentificationError),
-    Raised(PyErr),
-}
-
-impl From<IdentificationError> for Failure {
-    fn from(error: IdentificationError) -> Self {
-        Self::Refused(error)
-    }
 }
 
 /// Identify an axis of a cell by experiments, in narrower bands until a model fits.
@@ -71,7 +58,7 @@ pub(crate) fn identify_axis<'py>(
                 error_m: read_vector("error", &error_m)?,
             })
         };
-        execute().map(Some).map_err(Failure::Raised)
+        execute().map(Some).map_err(Raised)
     };
     let mut tell = |line: &str| {
         if let Err(error) = report.call1((line,)) {
@@ -82,13 +69,8 @@ pub(crate) fn identify_axis<'py>(
     if let Some(error) = raised {
         return Err(error);
     }
-    let found = match found {
-        Err(Failure::Raised(error)) => return Err(error),
-        Err(Failure::Refused(error)) => return Err(error).or_raise(),
-        Ok(found) => found,
-    };
     let (experiment, identified) =
-        found.ok_or_else(|| PyValueError::new_err("no experiment was completed"))?;
+        found.or_raise()?.ok_or_else(|| PyValueError::new_err("no experiment was completed"))?;
     let result = describe(py, identified)?;
     result.set_item("experiment", figures(py, &experiment)?)?;
     Ok(result)
@@ -121,7 +103,7 @@ pub(crate) fn evaluate_experiment<'py>(
     let period_samples = whole("period_samples", period_samples)?;
     let (band_hz, dt_s) = ((from_hz.0, to_hz.0), dt_s.0);
     let evaluate = || Identified::evaluate(u, y, period_samples, band_hz, dt_s, Form::Free);
-    describe(py, interruptible(py, evaluate)?.or_raise()?)
+    describe(py, computed(py, evaluate)?)
 }
 
 /// Returns the figures of an experiment, as the arguments of `ilc_rt.experiment.Experiment`.

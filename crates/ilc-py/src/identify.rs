@@ -12,8 +12,8 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, ByName, by_name, give_vector};
 use crate::argument::read_vector;
-use crate::arguments::Arguments;
-use crate::detached::interruptible;
+use crate::arguments::{Arguments, read};
+use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::experiment::read_waveform;
 use crate::model::PyStateSpace;
@@ -78,16 +78,16 @@ pub(crate) fn frequency_response<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
             Averaging::Welch { segment_samples, overlap_samples }
         }
     };
-    let found = interruptible(a.py(), || identify::frequency_response(&u, &y, dt_s, averaging))?;
-    give_measured(a.py(), found.or_raise()?)
+    let found = computed(a.py(), || identify::frequency_response(&u, &y, dt_s, averaging))?;
+    give_measured(a.py(), found)
 }
 
 #[pyfunction]
 pub(crate) fn fit_second_order<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
-    let known = Known { gain: a.maybe_number("gain")?, delay_s: a.maybe_number("delay_s")? };
-    let fit = interruptible(a.py(), || identify::fit_second_order(&measured, dt_s, known))?;
-    give_second_order(a.py(), &fit.or_raise()?)
+    let known = read!(a, Known: [maybe_number => gain, delay_s]);
+    let fit = computed(a.py(), || identify::fit_second_order(&measured, dt_s, known))?;
+    give_second_order(a.py(), &fit)
 }
 
 /// Returns a fit by the names of `ilc_rt.fits.SecondOrderFit`.
@@ -101,13 +101,10 @@ pub(crate) fn give_second_order<'py>(py: Python<'py>, fit: &SecondOrderFit) -> B
 }
 
 fn read_second_order(a: Arguments<'_, '_>) -> PyResult<SecondOrder> {
-    Ok(SecondOrder {
-        gain: a.number("gain")?,
-        natural_frequency_hz: a.number("natural_frequency_hz")?,
-        damping: a.number("damping")?,
-        delay_s: a.number("delay_s")?,
-        dt_s: a.maybe_number("dt_s")?,
-    })
+    Ok(read!(a, SecondOrder:
+        [number => gain, natural_frequency_hz, damping, delay_s]
+        [maybe_number => dt_s]
+    ))
 }
 
 #[pyfunction]
@@ -129,7 +126,7 @@ pub(crate) fn fit_velocity_loop<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (measured, gain_per_s) = (read_measured(a)?, a.number("position_gain_per_s")?);
     let (dt_s, delay_s) = (a.number("dt_s")?, a.maybe_number("delay_s")?);
     let fit = || identify::fit_velocity_loop(&measured, gain_per_s, dt_s, delay_s);
-    give_velocity_loop(a.py(), &interruptible(a.py(), fit)?.or_raise()?)
+    give_velocity_loop(a.py(), &computed(a.py(), fit)?)
 }
 
 /// Returns a fit by the names of `ilc_rt.fits.VelocityLoopFit`.
@@ -147,13 +144,9 @@ pub(crate) fn velocity_loop_response<'py>(
     a: Arguments<'_, 'py>,
 ) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
-    let model = VelocityLoop {
-        gain: a.number("gain")?,
-        bandwidth_hz: a.number("bandwidth_hz")?,
-        delay_s: a.number("delay_s")?,
-        position_gain_per_s: a.number("position_gain_per_s")?,
-        dt_s: a.number("dt_s")?,
-    };
+    let model = read!(a, VelocityLoop:
+        [number => gain, bandwidth_hz, delay_s, position_gain_per_s, dt_s]
+    );
     Ok(give_vector(a.py(), model.response(&frequency_hz)))
 }
 
@@ -163,7 +156,7 @@ pub(crate) fn fit_rational<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
     let delay_s = a.number("delay_s")?;
     let fit = || identify::fit_rational(&measured, n_zeros, n_poles, delay_s, dt_s);
-    let fit = interruptible(a.py(), fit)?.or_raise()?;
+    let fit = computed(a.py(), fit)?;
     let model = PyStateSpace::from(fit.model);
     Ok(by_name!(a.py(), [fit => delay_s, reflected_poles, residual_rms] model: model))
 }
@@ -183,15 +176,12 @@ pub(crate) fn excitation<'py>(
     a: Arguments<'_, 'py>,
 ) -> PyResult<(Bound<'py, PyAny>, usize, usize)> {
     let dt_s = a.number("dt_s")?;
-    let excitation = Excitation {
+    let excitation = read!(a, Excitation:
+        [number => amplitude, from_hz, to_hz, period_s]
+        [whole => periods]
         waveform: read_waveform(&a.text("waveform")?)?,
-        amplitude: a.number("amplitude")?,
-        from_hz: a.number("from_hz")?,
-        to_hz: a.number("to_hz")?,
-        period_s: a.number("period_s")?,
-        periods: a.whole("periods")?,
-    };
-    let signal = interruptible(a.py(), || excitation.signal(dt_s))?.or_raise()?;
+    );
+    let signal = computed(a.py(), || excitation.signal(dt_s))?;
     Ok((give_vector(a.py(), signal.values), signal.first_sample, signal.period_samples))
 }
 

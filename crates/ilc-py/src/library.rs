@@ -11,8 +11,8 @@ use crate::answer::{ByName, by_name, give_signal, give_vector};
 use crate::argument::{Signal, read_disturbance};
 use crate::arguments::{Arguments, read};
 use crate::detached::detached;
-use crate::error::OrRaise;
-use crate::library_rows::{Raised, give_row, next_row};
+use crate::error::{OrRaise, Raised};
+use crate::library_rows::{give_row, next_row};
 use crate::made::{Made, New, made};
 use crate::whole;
 
@@ -65,10 +65,8 @@ impl PyLibrary {
     /// Store runs of another library in one transaction, and return how many were new.
     fn _insert(&self, py: Python<'_>, rows: &Bound<'_, PyAny>) -> PyResult<usize> {
         let rows: Py<PyIterator> = rows.try_iter()?.unbind();
-        let inserted = self.write(py, |library| {
-            Ok(library.insert::<Raised>(std::iter::from_fn(|| next_row(&rows))))
-        })?;
-        inserted.map_err(|Raised(error)| error)
+        let next = || next_row(&rows);
+        self.write(py, |library| Ok(library.insert::<Raised>(std::iter::from_fn(next))))?.or_raise()
     }
 
     /// Delete runs in one transaction.

@@ -1,6 +1,6 @@
 //! Rows of a library as Python exchanges them with other stores: texts of JSON, arrays as bytes.
 
-use ilc_rt::library::{LibraryError, Row};
+use ilc_rt::library::Row;
 use ilc_rt::record::{IterationRecord, Meta};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
@@ -8,17 +8,7 @@ use pyo3::types::{PyBytes, PyDict, PyIterator, PyString};
 
 use crate::answer::{ByName, by_name};
 use crate::arguments::read;
-use crate::error::OrRaise;
-
-/// An exception, of Python or of the library.
-#[derive(Debug)]
-pub(crate) struct Raised(pub(crate) PyErr);
-
-impl From<LibraryError> for Raised {
-    fn from(error: LibraryError) -> Self {
-        Self(Err::<(), _>(error).or_raise().err().unwrap_or_else(|| PyValueError::new_err("")))
-    }
-}
+use crate::error::Raised;
 
 /// Returns a row: names and numbers, lists and figures as JSON, arrays as little-endian float64.
 pub(crate) fn give_row<'py>(py: Python<'py>, row: &Row) -> ByName<'py> {

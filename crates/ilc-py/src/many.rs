@@ -8,8 +8,7 @@ use pyo3::prelude::*;
 use crate::answer::{ByName, by_name, give_vector};
 use crate::argument::{read_disturbance, read_vector};
 use crate::arguments::Arguments;
-use crate::detached::interruptible;
-use crate::error::OrRaise;
+use crate::detached::computed;
 use crate::laws::apart;
 use crate::model_argument::read_model;
 use crate::python_law::Channels;
@@ -50,7 +49,7 @@ pub(crate) fn simulate_many<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
         seeds: &seeds,
         kept: [a.whole("kept_errors")?, a.whole("kept_inputs")?],
     };
-    let found = interruptible(a.py(), || batch::learn(&task, &laws))?.or_raise()?;
+    let found = computed(a.py(), || batch::learn(&task, &laws))?;
     let array = |values: Vec<f64>| give_vector(a.py(), values);
     Ok(by_name!(a.py(),
         rms: array(found.rms),

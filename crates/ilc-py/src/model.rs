@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use crate::answer::{Array, give_matrices, give_matrix, give_signal, give_vector};
 use crate::argument::{Signal, read_matrix, read_vector};
 use crate::arguments::Arguments;
-use crate::detached::interruptible;
+use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
 use crate::whole::{number, whole};
@@ -146,14 +146,14 @@ impl PyStateSpace {
     ) -> Array<'py> {
         let u = Signal::read("u", u)?.with_channels("u", self.n_inputs)?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
-        let y = interruptible(py, || self.model.simulate(&u.values, x0.as_deref()))?.or_raise()?;
+        let y = computed(py, || self.model.simulate(&u.values, x0.as_deref()))?;
         give_signal(py, y, self.n_outputs, u.is_flat && self.n_outputs == 1)
     }
 
     /// Return the first `n` Markov parameters D, CB, CAB, ..., shape (n, n_outputs, n_inputs).
     fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
-        let parameters = interruptible(py, || self.model.markov(n))?.or_raise()?;
+        let parameters = computed(py, || self.model.markov(n))?;
         let shape = (n, self.n_outputs, self.n_inputs);
         Ok(give_matrices(py, shape, |k, row, col| parameters[k][(row, col)]))
     }
@@ -163,7 +163,7 @@ impl PyStateSpace {
     /// The block lower-triangular Toeplitz matrix of the Markov parameters, sample by sample.
     fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
-        let lifted = interruptible(py, || self.model.lifted(n))?.or_raise()?;
+        let lifted = computed(py, || self.model.lifted(n))?;
         Ok(give_matrix(py, &lifted))
     }
 
@@ -194,7 +194,7 @@ impl PyStateSpace {
 
     /// Return the finite invariant zeros, in no particular order [emami1982].
     fn zeros<'py>(&self, py: Python<'py>) -> Array<'py> {
-        let zeros = interruptible(py, || self.model.zeros())?.or_raise()?;
+        let zeros = computed(py, || self.model.zeros())?;
         Ok(give_vector(py, zeros))
     }
 
@@ -206,7 +206,7 @@ impl PyStateSpace {
     /// Return C (q I - A)^-1 B + D at frequencies in rad/s, shape (n_frequencies, n_outputs, n_inputs).
     fn frequency_response<'py>(&self, py: Python<'py>, w_rad_s: &Bound<'py, PyAny>) -> Array<'py> {
         let w = read_vector("w_rad_s", w_rad_s)?;
-        let response = interruptible(py, || self.model.frequency_response(&w))?.or_raise()?;
+        let response = computed(py, || self.model.frequency_response(&w))?;
         let shape = (w.len(), self.n_outputs, self.n_inputs);
         Ok(give_matrices(py, shape, |k, row, col| response[k][(row, col)]))
     }
@@ -223,7 +223,7 @@ impl PyStateSpace {
         let w = read_vector("w_rad_s", w_rad_s)?;
         let output = output.map_or(Ok(0), |output| whole("output", output))?;
         let input = input.map_or(Ok(0), |input| whole("input", input))?;
-        let bode = interruptible(py, || self.model.bode(&w, output, input))?.or_raise()?;
+        let bode = computed(py, || self.model.bode(&w, output, input))?;
         Ok((give_vector(py, bode.magnitude), give_vector(py, bode.phase_rad)))
     }
 

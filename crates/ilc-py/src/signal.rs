@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-use crate::answer::{Array, ByName, give_signal, give_vector};
+use crate::answer::{Array, ByName, by_name, give_signal, give_vector};
 use crate::argument::{Layout, Signal, read_vector};
 use crate::arguments::Arguments;
 use crate::detached::detached;
@@ -35,13 +35,8 @@ impl PyFilter {
         let filter = match kind.as_str() {
             "butterworth" => {
                 let (order, cutoff_hz) = (a.whole("order")?, a.number("cutoff_hz")?);
-                let sections =
-                    signal::butterworth(order, cutoff_hz, a.number("dt_s")?).or_raise()?;
-                if a.flag("causal")? {
-                    QFilter::Causal(sections)
-                } else {
-                    QFilter::ZeroPhase(sections)
-                }
+                let kind = if a.flag("causal")? { QFilter::Causal } else { QFilter::ZeroPhase };
+                kind(signal::butterworth(order, cutoff_hz, a.number("dt_s")?).or_raise()?)
             }
             "gaussian" => QFilter::Gaussian(
                 GaussianFilter::new(a.number("bandwidth_hz")?, a.number("dt_s")?).or_raise()?,
@@ -98,24 +93,18 @@ impl PyFilter {
     /// Parameters of the filter by name, in addition to its arguments.
     fn _figures<'py>(&self, py: Python<'py>) -> ByName<'py> {
         let figures = self.arguments.bind(py).copy()?;
-        match &self.filter {
-            QFilter::Gaussian(filter) => {
-                figures.set_item("sigma_samples", filter.sigma_samples())?;
-            }
-            QFilter::Fir(filter) => {
-                figures.set_item("taps", give_vector(py, filter.taps().to_vec()))?;
-            }
-            QFilter::Switched(filter) => {
-                let segments = filter.segments();
-                let cutoffs_hz: Vec<f64> = segments.iter().map(|found| found.cutoff_hz).collect();
-                let starts: Vec<usize> = segments.iter().map(|found| found.start).collect();
-                figures.set_item("cutoffs_hz", cutoffs_hz)?;
-                figures.set_item("starts", starts)?;
-                figures.set_item("order", filter.order())?;
-                figures.set_item("blend", filter.blend())?;
-            }
-            _ => {}
-        }
+        let others = match &self.filter {
+            QFilter::Gaussian(filter) => by_name!(py, sigma_samples: filter.sigma_samples()),
+            QFilter::Fir(filter) => by_name!(py, taps: give_vector(py, filter.taps().to_vec())),
+            QFilter::Switched(filter) => by_name!(py,
+                cutoffs_hz: filter.segments().iter().map(|part| part.cutoff_hz).collect::<Vec<_>>(),
+                starts: filter.segments().iter().map(|part| part.start).collect::<Vec<_>>(),
+                order: filter.order(),
+                blend: filter.blend(),
+            ),
+            _ => return Ok(figures),
+        };
+        figures.update(others.as_mapping())?;
         Ok(figures)
     }
 
@@ -163,11 +152,9 @@ fn switched(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
             starts.len()
         )));
     }
-    let segments: Vec<Segment> = starts
-        .into_iter()
-        .zip(cutoffs_hz)
-        .map(|(start, cutoff_hz)| Segment { start, cutoff_hz })
-        .collect();
+    let segments = starts.into_iter().zip(cutoffs_hz);
+    let segments: Vec<_> =
+        segments.map(|(start, cutoff_hz)| Segment { start, cutoff_hz }).collect();
     SwitchedFilter::new(a.whole("order")?, &segments, a.whole("blend")?, a.number("dt_s")?)
         .or_raise()
 }

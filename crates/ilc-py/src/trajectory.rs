@@ -21,7 +21,7 @@ use pyo3::prelude::*;
 use crate::answer::{ByName, by_name, give_signal};
 use crate::argument::read_vector;
 use crate::arguments::{Arguments, read};
-use crate::detached::interruptible;
+use crate::detached::computed;
 use crate::error::OrRaise;
 
 /// A chosen alpha: segment, place, value, and its admissible intervals.
@@ -36,7 +36,7 @@ pub(crate) const SETTINGS: [(&str, LinearSetting); 2] =
 /// Plans a motion while other Python threads run, and returns its samples by name.
 fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> ByName<'_> {
     let begun = Instant::now();
-    let (motion, alphas) = interruptible(py, plan)?.or_raise()?;
+    let (motion, alphas) = computed(py, plan)?;
     let computing_s = begun.elapsed().as_secs_f64();
     let signal = |values| give_signal(py, values, motion.n_axes, false);
     Ok(by_name!(py,

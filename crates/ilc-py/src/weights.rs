@@ -1,6 +1,5 @@
 //! Weights along the run: `ilc_rt.weights`, and their conversion for laws.
 
-use ilc_rt::learning::LearningError;
 use ilc_rt::learning::weights::{
     Contour, ContourTerms, Coupled, Formation, Gain, Objective, Pass, Schedule, Weight, band,
 };
@@ -14,9 +13,6 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
 use crate::whole::{each, number, pair, shown, whole};
-
-/// Largest number of entries of all matrices together: 0.8 GB.
-const VALUES_MAX: usize = 100_000_000;
 
 /// Reads a number, or one per sample.
 fn read_gain(a: Arguments<'_, '_>, name: &str, n_samples: usize) -> PyResult<Gain> {
@@ -71,21 +67,7 @@ pub(crate) fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<V
 
 /// Returns a weight to Python as one matrix per sample.
 fn give_blocks<'py>(py: Python<'py>, weight: &Weight, n_samples: usize, p: usize) -> Array<'py> {
-    let allowed = VALUES_MAX / (p * p).max(1);
-    if n_samples > allowed {
-        let (what, value) = ("n_samples", n_samples);
-        return Err(LearningError::TooMany { what, value, allowed }).or_raise();
-    }
-    let mut values = Vec::with_capacity(n_samples * p * p);
-    for k in 0..n_samples {
-        // Symmetric: column-major equals row-major.
-        values.extend_from_slice(weight.at(k, p).as_slice());
-    }
-    if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-        let (what, sample) = ("weight", at / (p * p));
-        let reason = "what it is made of is so large that it is not finite".to_owned();
-        return Err(LearningError::Weight { what, sample, reason }).or_raise();
-    }
+    let values = weight.values(n_samples, p).or_raise()?;
     Ok(give_matrices(py, (n_samples, p, p), |k, row, col| values[(k * p + row) * p + col]))
 }
 
@@ -93,11 +75,8 @@ fn give_blocks<'py>(py: Python<'py>, weight: &Weight, n_samples: usize, p: usize
 pub(crate) fn read_contour(a: Arguments<'_, '_>) -> PyResult<(Weight, usize, usize)> {
     let reference = a.signal("reference")?;
     let (n_samples, p) = (reference.n_samples, reference.n_channels);
-    let terms = ContourTerms {
-        q: a.weight("q", n_samples, p)?,
-        contour: read_gain(a, "contour", n_samples)?,
-        along: read_gain(a, "along", n_samples)?,
-    };
+    let (q, gain) = (a.weight("q", n_samples, p)?, |name| read_gain(a, name, n_samples));
+    let terms = ContourTerms { q, contour: gain("contour")?, along: gain("along")? };
     let axes = a.maybe_wholes("axes")?.unwrap_or_else(|| (0..p).collect());
     let weight = detached(a.py(), || Contour::of_axes(&reference.values, p, &axes)?.weight(&terms));
     Ok((weight.or_raise()?, n_samples, p))
@@ -145,10 +124,8 @@ pub(crate) fn contour_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
 pub(crate) fn coupled_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let matrices = read_matrices("coupling", &a.get("coupling")?)?;
     let (n_samples, p) = (matrices.len(), matrices[0].ncols());
-    let shares = Coupled {
-        sigma: read_gain(a, "sigma", n_samples)?,
-        gamma: read_gain(a, "gamma", n_samples)?,
-    };
+    let gain = |name| read_gain(a, name, n_samples);
+    let shares = Coupled { sigma: gain("sigma")?, gamma: gain("gamma")? };
     let weight = detached(a.py(), || shares.weight(n_samples, &matrices)).or_raise()?;
     give_blocks(a.py(), &weight, n_samples, p)
 }

@@ -5,39 +5,31 @@ use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyString};
 
-/// Largest count, index or order.
-const MAX: u64 = u32::MAX as u64;
-
-/// Reads an integer: Python's, NumPy's, or any object with `__index__`.
+/// Reads a count, an index or an order: Python's integers, NumPy's, or any object with `__index__`.
 ///
 /// # Errors
 /// - `TypeError` for a bool, a float, or any other non-integer.
 /// - `ValueError` for a number that is negative or too large.
 pub(crate) fn whole(name: &str, object: &Bound<'_, PyAny>) -> PyResult<usize> {
-    let number = integer(name, object, &format!("0 to {MAX}"))?;
-    match number.extract::<u64>().ok().filter(|value| *value <= MAX) {
-        #[expect(clippy::cast_possible_truncation, reason = "at most 32 bits")]
-        Some(value) => Ok(value as usize),
-        None => Err(out_of_range(name, &number, &format!("0 to {MAX}"))),
-    }
+    #[expect(clippy::cast_possible_truncation, reason = "at most 32 bits")]
+    within(name, object, u32::MAX.into()).map(|value| value as usize)
 }
 
-/// Returns the integer value of an object.
-fn integer<'py>(
-    name: &str,
-    object: &Bound<'py, PyAny>,
-    range: &str,
-) -> PyResult<Bound<'py, PyAny>> {
-    let refused = || refused(name, object, &format!("a whole number from {range}"));
+/// Reads the identity of a run.
+pub(crate) fn id(object: &Bound<'_, PyAny>) -> PyResult<i64> {
+    within("id", object, i64::MAX.unsigned_abs()).map(u64::cast_signed)
+}
+
+fn within(name: &str, object: &Bound<'_, PyAny>, max: u64) -> PyResult<u64> {
+    let needed = format!("a whole number from 0 to {max}");
+    let refused = || refused(name, object, &needed);
     if object.is_instance_of::<PyBool>() || object.is_instance_of::<PyFloat>() {
         return Err(refused());
     }
-    object.call_method0("__index__").map_err(|_| refused())
-}
-
-fn out_of_range(name: &str, number: &Bound<'_, PyAny>, range: &str) -> PyErr {
-    let text = shown(number);
-    PyValueError::new_err(format!("{name} = {text}; a whole number from {range} is needed"))
+    let number = object.call_method0("__index__").map_err(|_| refused())?;
+    number.extract().ok().filter(|value| *value <= max).ok_or_else(|| {
+        PyValueError::new_err(format!("{name} = {}; {needed} is needed", shown(&number)))
+    })
 }
 
 /// Returns the repr of a value, in one line of bounded length.
@@ -73,16 +65,6 @@ pub(crate) fn pair<'py>(
     object.extract().map_err(|_| {
         PyTypeError::new_err(format!("{name} holds {}; {needed} is needed", shown(object)))
     })
-}
-
-/// Reads the identity of a run.
-pub(crate) fn id(object: &Bound<'_, PyAny>) -> PyResult<i64> {
-    let range = format!("0 to {}", i64::MAX);
-    let number = integer("id", object, &range)?;
-    match number.extract::<i64>() {
-        Ok(value) if value >= 0 => Ok(value),
-        _ => Err(out_of_range("id", &number, &range)),
-    }
 }
 
 /// Reads a number: Python's, NumPy's, or any object with `__float__`.

@@ -12,7 +12,7 @@ use super::figure::readable;
 use super::{Builder, Built, Call, Fits, Readable};
 use crate::argument::{Matrix, misfit};
 use crate::arguments::Arguments;
-use crate::detached::interruptible;
+use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::model_argument::{AnyModel, read_any_model, read_model};
 use crate::python_law::Channels;
@@ -85,7 +85,7 @@ fn build(
 ) -> PyResult<Built> {
     let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
     let cost = read_cost(call.arguments, q, n_samples, channels.n_inputs)?;
-    let law = interruptible(call.py(), || -> Result<Box<dyn Readable>, LearningError> {
+    let law = computed(call.py(), || -> Result<Box<dyn Readable>, LearningError> {
         let plant = model.plant();
         Ok(match filters {
             None => Box::new(NormOptimal::new(plant, n_samples, cost)?),
@@ -94,7 +94,7 @@ fn build(
             }
         })
     })?;
-    Ok(Built { law: law.or_raise()?, fits: Fits::Fixed(n_samples, channels) })
+    Ok(Built { law: law, fits: Fits::Fixed(n_samples, channels) })
 }
 
 /// Reads the weights of input, change and rate, in addition to that of the error.
