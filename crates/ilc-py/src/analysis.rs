@@ -21,13 +21,13 @@ use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::laws;
 use crate::python_law::Channels;
-use crate::whole::number;
+use crate::whole::{number, whole};
 
 #[pyfunction]
 pub(crate) fn analyze<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let model = a.model("model")?;
     let law = a.get("law")?;
-    let given = a.maybe_whole("n_samples")?;
+    let given = a.maybe("n_samples", whole)?;
     let reference = read_reference(a, &model, given)?;
     let known = given.map_or_else(|| laws::samples_of(&law), |given| Ok(Some(given)))?;
     let of_reference = reference.as_ref().map(|signal| signal.n_samples);

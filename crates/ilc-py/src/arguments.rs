@@ -90,11 +90,6 @@ impl<'a, 'py> Arguments<'a, 'py> {
         whole(name, &self.get(name)?)
     }
 
-    /// Reads a whole number, or `None`.
-    pub(crate) fn maybe_whole(self, name: &str) -> PyResult<Option<usize>> {
-        self.maybe(name, whole)
-    }
-
     /// Reads indices from 0, or `None`.
     pub(crate) fn maybe_wholes(self, name: &str) -> PyResult<Option<Vec<usize>>> {
         self.maybe(name, |name, list| {

@@ -139,16 +139,13 @@ fn read_point(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
 /// Reads a list of shapes; `None` for anything else.
 fn read_shapes(object: &Bound<'_, PyAny>, window: Option<usize>) -> PyResult<Option<Vec<Shape>>> {
     let Ok(list) = object.cast::<PyList>() else { return Ok(None) };
-    let mut shapes = Vec::with_capacity(list.len());
-    for item in list {
-        if let Ok(line) = item.cast::<PyLine>() {
-            shapes.push(Shape::Line(line.get().0));
-        } else if let Ok(arc) = item.cast::<PyArc>() {
-            shapes.push(Shape::Arc(arc.get().0));
-        } else {
-            return Ok(None);
-        }
-    }
+    let shape = |item: Bound<'_, PyAny>| {
+        let line = item.cast::<PyLine>().map(|line| Shape::Line(line.get().0));
+        line.or_else(|_| item.cast::<PyArc>().map(|arc| Shape::Arc(arc.get().0))).ok()
+    };
+    let Some(shapes) = list.iter().map(shape).collect::<Option<Vec<Shape>>>() else {
+        return Ok(None);
+    };
     if shapes.is_empty() {
         return Err(PyValueError::new_err("reference_m is an empty list; a path is needed"));
     }

@@ -17,6 +17,7 @@ use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::experiment::read_waveform;
 use crate::model::PyStateSpace;
+use crate::whole::whole;
 
 /// Reads a measured response.
 fn read_measured(a: Arguments<'_, '_>) -> PyResult<FrequencyResponse> {
@@ -65,8 +66,8 @@ pub(crate) fn relative_deviation<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
 #[pyfunction]
 pub(crate) fn frequency_response<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (u, y, dt_s) = (a.vector("u")?, a.vector("y")?, a.number("dt_s")?);
-    let overlap_samples = a.maybe_whole("overlap_samples")?;
-    let averaging = match (a.maybe_whole("period_samples")?, a.maybe_whole("segment_samples")?) {
+    let overlap_samples = a.maybe("overlap_samples", whole)?;
+    let averaging = match (a.maybe("period_samples", whole)?, a.maybe("segment_samples", whole)?) {
         (Some(_), Some(_)) => {
             let line = "period_samples and segment_samples exclude each other; give one of them";
             return Err(PyValueError::new_err(line));

@@ -93,13 +93,11 @@ impl PythonLaw {
         let is_flat = self.frame.is_flat();
         let given = self.frame.disturbance.lock().unwrap_or_else(PoisonError::into_inner).take();
         let announced = self.next_disturbance.take();
-        let disturbance = match (given, announced) {
-            (Some(given), Some(announced)) => {
-                self.announce(py, announced);
-                Some(given.into_bound(py))
-            }
-            (Some(given), None) => Some(given.into_bound(py)),
-            (None, announced) => announced.map(|values| give_vector(py, values)),
+        let disturbance = if let Some(given) = given {
+            announced.into_iter().for_each(|announced| self.announce(py, announced));
+            Some(given.into_bound(py))
+        } else {
+            announced.map(|values| give_vector(py, values))
         };
         let u = give_signal(py, input.to_vec(), n_inputs, is_flat && n_inputs == 1)?;
         let e = give_signal(py, error.to_vec(), n_outputs, is_flat && n_outputs == 1)?;

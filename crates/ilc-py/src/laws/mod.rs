@@ -390,11 +390,7 @@ impl PyLaw {
     ) -> PyResult<()> {
         let channels = Channels { n_inputs: u.n_channels, n_outputs: e.n_channels };
         match (self.fits, state.size) {
-            (Fits::Fixed(n_samples, channels), _) => {
-                u.require_exactly("u", n_samples, channels.n_inputs)?;
-                return e.require_exactly("e", n_samples, channels.n_outputs);
-            }
-            (Fits::First, Some(size)) => {
+            (Fits::Fixed(..) | Fits::First, Some(size)) => {
                 u.require_exactly("u", size.n_samples, size.channels.n_inputs)?;
                 return e.require_exactly("e", size.n_samples, size.channels.n_outputs);
             }
@@ -407,12 +403,13 @@ impl PyLaw {
                 e.require_samples("e", u.n_samples)?;
                 e.require_channels("e", u.n_channels)?;
             }
-            (Fits::Any, _) | (Fits::First, None) => e.require_samples("e", u.n_samples)?,
+            (Fits::Any, _) | (_, None) => e.require_samples("e", u.n_samples)?,
         }
         let told = disturbance.or(state.announced.last().map(Vec::as_slice));
         let n_disturbances = told.map_or(0, <[f64]>::len);
         let size = Size { n_samples: u.n_samples, channels, n_disturbances };
-        if self.fits != Fits::First && state.size == Some(Size { n_disturbances: 0, ..size }) {
+        let kept = if self.fits == Fits::First { size } else { Size { n_disturbances: 0, ..size } };
+        if state.size == Some(kept) {
             return Ok(());
         }
         self.frame.prepare(u.is_flat, None);
@@ -420,9 +417,7 @@ impl PyLaw {
         for disturbance in std::mem::take(&mut state.announced) {
             law.set_disturbance(&disturbance);
         }
-        state.law = law;
-        state.size =
-            Some(if self.fits == Fits::First { size } else { Size { n_disturbances: 0, ..size } });
+        (state.law, state.size) = (law, Some(kept));
         Ok(())
     }
 

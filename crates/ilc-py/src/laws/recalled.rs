@@ -15,7 +15,7 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
 use crate::python_law::Channels;
-use crate::whole::number;
+use crate::whole::{number, whole};
 
 /// The laws of this file.
 pub(super) const BUILDERS: &[Builder] = &[("relevance", relevance), ("flexible", flexible)];
@@ -42,7 +42,7 @@ readable! {
 pub(super) fn relevance(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;
     let weights = read_weights(&a.get("weights")?)?;
-    let (top, dt_s) = (a.maybe_whole("top")?, a.maybe_number("dt_s")?);
+    let (top, dt_s) = (a.maybe("top", whole)?, a.maybe_number("dt_s")?);
     let has_library = a.given("library")?.is_some();
     if weights.error_rate > 0.0 && dt_s.is_none() && !has_library {
         return Err(no_sample_time(&weights));
