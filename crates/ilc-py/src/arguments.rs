@@ -126,7 +126,16 @@ impl<'a, 'py> Arguments<'a, 'py> {
 
     /// Reads one of several words, each with its meaning.
     pub(crate) fn choice<T: Copy>(self, name: &str, choices: &[(&str, T)]) -> PyResult<T> {
-        chosen(name, &self.get(name)?, choices)
+        let word = self.get(name)?;
+        let text = word.cast::<PyString>().map_err(|_| refused(name, &word, "a text"))?.to_str()?;
+        if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
+            return Ok(*meaning);
+        }
+        let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
+        let words = words.join(", ");
+        let (others, last) = words.rsplit_once(", ").unwrap_or(("", &words));
+        let line = format!("{name} = {}; {others} or {last} is needed", shown(&word));
+        Err(PyValueError::new_err(line))
     }
 
     /// Reads a time-invariant model.
@@ -217,21 +226,3 @@ macro_rules! read {
     };
 }
 pub(crate) use read;
-
-/// Reads one of several words, each with its meaning.
-pub(crate) fn chosen<T: Copy>(
-    name: &str,
-    word: &Bound<'_, PyAny>,
-    choices: &[(&str, T)],
-) -> PyResult<T> {
-    let text = word.cast::<PyString>().map_err(|_| refused(name, word, "a text"))?.to_str()?;
-    if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
-        return Ok(*meaning);
-    }
-    let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
-    let (last, others) = words
-        .split_last()
-        .map_or((String::new(), &words[..]), |(last, others)| (last.clone(), others));
-    let (text, others) = (shown(word), others.join(", "));
-    Err(PyValueError::new_err(format!("{name} = {text}; {others} or {last} is needed")))
-}

@@ -114,7 +114,6 @@ impl Drop for EventStream {
 /// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
 ///     something else cannot.
 #[pyfunction(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn run_events(
     cell: &Bound<'_, PyCell>,
     arguments: Vec<String>,
@@ -192,7 +191,6 @@ impl Work {
 ///
 /// Raises ValueError with the name of the option, its value and the allowed values.
 #[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)
 }

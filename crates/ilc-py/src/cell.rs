@@ -93,7 +93,6 @@ impl PyCell {
     /// Returns Cell. Raises ValueError in one line: file, key, value and the allowed values.
     #[staticmethod]
     #[pyo3(signature = (path, allow_divergent=false))]
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn load(
         py: Python<'_>,
         path: std::path::PathBuf,
@@ -113,7 +112,6 @@ impl PyCell {
     ///
     /// A diverging law is accepted.
     #[staticmethod]
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn _check(text: &str, path: std::path::PathBuf) -> PyResult<()> {
         let mut cell = Cell::parse(text, &path.display().to_string()).or_raise()?;
         cell.learning.allow_divergent = true;

@@ -1,6 +1,6 @@
 //! Contour geometry: `contour_error`, `coupling_gains`, `projection_across`, `Line`, `Arc`.
 
-use ilc_rt::trajectory::contour::{Arc, ContourError, Line, SampledPath, Shape, coupling};
+use ilc_rt::trajectory::contour::{Arc, Line, SampledPath, Shape, coupling};
 use ilc_rt::trajectory::{MAX_AXES, contour_error_m};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -42,35 +42,32 @@ impl PyArc {
     }
 }
 
-#[pyfunction(signature = (reference_m, actual_m, window=None))]
-pub(crate) fn contour_error<'py>(
-    reference_m: &Bound<'py, PyAny>,
-    actual_m: &Bound<'py, PyAny>,
-    window: Option<&Bound<'py, PyAny>>,
-) -> Array<'py> {
-    let py = reference_m.py();
-    let window = window.map(|window| whole("window", window)).transpose()?;
-    if let Some(shapes) = read_shapes(reference_m, window)? {
-        let points = read_points("actual_m", actual_m)?;
+#[pyfunction]
+pub(crate) fn contour_error<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
+    let (py, path, actual_m) = (a.py(), a.get("reference_m")?, a.get("actual_m")?);
+    let window = a.maybe("window", whole)?;
+    if let Some(shapes) = read_shapes(&path, window)? {
+        let points = read_points("actual_m", &actual_m)?;
         let errors = detached(py, || Shape::contour_error_m(&shapes, &points));
         return Ok(give_vector(py, errors));
     }
-    let reference = read_path("reference_m", reference_m)?;
-    let n_axes = reference.n_channels;
-    let actual = read_path("actual_m", actual_m)?.with_channels("actual_m", n_axes)?;
-    let errors = match (window, n_axes) {
-        (Some(window), 1..=MAX_AXES) => {
-            detached(py, || contour_error_m(&reference.values, &actual.values, n_axes, window))
-        }
-        (None, 2) => to_sampled::<2>(py, &reference, &actual)?,
-        (None, 3) => to_sampled::<3>(py, &reference, &actual)?,
-        (None, _) => {
-            let allowed = "2 or 3 axes, or 1 to 12 with a window,";
-            return Err(misfit("reference_m", &reference.shape(), allowed));
-        }
-        (Some(_), _) => return Err(misfit("reference_m", &reference.shape(), "1 to 12 axes")),
+    let Signal { values: reference, layout } = read_path("reference_m", &path)?;
+    let n_axes = layout.n_channels;
+    let actual = read_path("actual_m", &actual_m)?.with_channels("actual_m", n_axes)?.values;
+    let allowed = match window {
+        None if !matches!(n_axes, 2 | 3) => "2 or 3 axes, or 1 to 12 with a window,",
+        Some(_) if n_axes > MAX_AXES => "1 to 12 axes",
+        _ => "",
     };
-    Ok(give_vector(py, errors))
+    if !allowed.is_empty() {
+        return Err(misfit("reference_m", &layout.shape(), allowed));
+    }
+    let errors = detached(py, || match window {
+        Some(window) => Ok(contour_error_m(&reference, &actual, n_axes, window)),
+        None if n_axes == 2 => SampledPath::<2>::contour_error_m(&reference, &actual),
+        None => SampledPath::<3>::contour_error_m(&reference, &actual),
+    });
+    Ok(give_vector(py, errors.or_raise()?))
 }
 
 #[pyfunction]
@@ -93,20 +90,6 @@ pub(crate) fn projection_across<'py>(reference_m: &Bound<'py, PyAny>) -> Array<'
     let n = reference.n_channels;
     let at = |k: usize, row, col| flat[(k * n + row) * n + col];
     Ok(give_matrices(reference_m.py(), (reference.n_samples, n, n), at))
-}
-
-fn to_sampled<const N: usize>(
-    py: Python<'_>,
-    reference: &Signal,
-    actual: &Signal,
-) -> PyResult<Vec<f64>> {
-    detached(py, || {
-        let path = SampledPath::<N>::new(reference.values.as_chunks().0)?;
-        let points = actual.values.as_chunks().0.iter();
-        let distance = |p| path.nearest(p).map_or(f64::NAN, |found| found.distance_m);
-        Ok::<Vec<f64>, ContourError>(points.map(distance).collect())
-    })
-    .or_raise()
 }
 
 /// Reads a path, always with a channel axis.

@@ -7,7 +7,7 @@ use ilc_rt::interrupt;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-use crate::error::OrRaise;
+use crate::error::{OrRaise, Raised};
 
 /// Runs `work` while other Python threads run: for everything that may take more than 100 us. It is not
 /// interrupted, as it may change what others keep.
@@ -21,7 +21,7 @@ pub(crate) fn computed<T: Send, E: Send>(
     work: impl Send + FnOnce() -> Result<T, E>,
 ) -> PyResult<T>
 where
-    Result<T, E>: OrRaise<T>,
+    Raised: From<E>,
 {
     interruptible(py, work)?.or_raise()
 }

@@ -5,7 +5,7 @@ use ilc_rt::cli::parse;
 use ilc_rt::identification::{
     self, Described, Experiment, ExperimentOptions, Form, Identified, Signals, waveform_name,
 };
-use ilc_rt::model::identify::{Doubt, Waveform};
+use ilc_rt::model::identify::Doubt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -16,15 +16,6 @@ use crate::detached::computed;
 use crate::error::{OrRaise, Raised};
 use crate::identify::{give_measured, give_second_order, give_velocity_loop};
 use crate::whole::{Real, whole};
-
-/// Reads the name of a waveform.
-pub(crate) fn read_waveform(name: &str) -> PyResult<Waveform> {
-    identification::waveform(name).ok_or_else(|| {
-        PyValueError::new_err(format!(
-            "waveform = '{name}'; 'sweep', 'linear-sweep' or 'multisine' is needed"
-        ))
-    })
-}
 
 /// Identify an axis of a cell by experiments, in narrower bands until a model fits.
 ///
@@ -38,7 +29,6 @@ pub(crate) fn read_waveform(name: &str) -> PyResult<Waveform> {
 /// Raises ModelError if the response cannot be fitted.
 /// Raises ValueError if an option cannot be used, or an amplitude is beyond a limit.
 #[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn identify_axis<'py>(
     py: Python<'py>,
     cell: &Bound<'py, PyCell>,
@@ -78,7 +68,6 @@ pub(crate) fn identify_axis<'py>(
 
 /// Return the experiment of options, words of ``ilc-rt identify``, in the default band if they give none.
 #[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> ByName<'_> {
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
     let axis = options.axis.clone().unwrap_or_default();

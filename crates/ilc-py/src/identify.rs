@@ -2,6 +2,7 @@
 //!
 //! Each function returns its figures by name; the classes that hold them are those of `ilc_rt.fits`.
 
+use ilc_rt::identification::WAVEFORMS;
 use ilc_rt::model::identify::{
     self, Averaging, Excitation, FrequencyResponse, Known, SecondOrder, SecondOrderFit,
     VelocityLoop, VelocityLoopFit,
@@ -15,7 +16,6 @@ use crate::argument::read_vector;
 use crate::arguments::{Arguments, read};
 use crate::detached::computed;
 use crate::error::OrRaise;
-use crate::experiment::read_waveform;
 use crate::model::PyStateSpace;
 use crate::whole::whole;
 
@@ -180,7 +180,7 @@ pub(crate) fn excitation<'py>(
     let excitation = read!(a, Excitation:
         [number => amplitude, from_hz, to_hz, period_s]
         [whole => periods]
-        waveform: read_waveform(&a.text("waveform")?)?,
+        waveform: a.choice("waveform", &WAVEFORMS)?,
     );
     let signal = computed(a.py(), || excitation.signal(dt_s))?;
     Ok((give_vector(a.py(), signal.values), signal.first_sample, signal.period_samples))

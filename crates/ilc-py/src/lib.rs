@@ -5,11 +5,13 @@
 //!
 //! Family: `laws` and `python_law` call each other: an inner law may be written in Python.
 //!
-//! Family: `arguments`, `model` and `model_argument` read each other's arguments.
-//!
-//! Family: `experiment` and `identify` read each other's arguments.
+//! Family: `arguments`, `model`, `model_argument` and `signal` read each other's arguments.
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
+#![expect(
+    clippy::needless_pass_by_value,
+    reason = "arguments are owned, as Python hands them over"
+)]
 
 mod analysis;
 mod answer;

@@ -312,7 +312,6 @@ impl PyStateSpace {
         give(self.model.inverse())
     }
 
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn _select(&self, outputs: Vec<usize>, inputs: Vec<usize>) -> PyResult<Self> {
         give(self.model.select(&outputs, &inputs))
     }

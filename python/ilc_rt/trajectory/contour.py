@@ -122,7 +122,7 @@ def contour_error(
     >>> contour_error(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0.5, 0.25]]))
     array([0.25])
     """
-    return _native.contour_error(reference_m=reference_m, actual_m=actual_m, window=window)
+    return _native.contour_error(locals())
 
 
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]:

@@ -229,7 +229,7 @@ impl PyLaw {
     ) -> Array<'py> {
         let mut state = self.state.borrow(py)?;
         let signals = Signals::read(u, e, out, &mut state.copies)?;
-        let (u, e) = signals.layouts();
+        let (u, e) = (signals.input.layout, signals.error.layout);
         let told = if state.law.n_disturbances().is_some() {
             disturbance.map(|given| read_disturbance("disturbance", given)).transpose()?
         } else {
@@ -319,7 +319,7 @@ impl PyLaw {
         let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
         let told = read_told("disturbance", disturbance)?;
         let mut state = self.state.borrow(py)?;
-        self.fit(py, &mut state, u.layout(), e.layout(), Some(&told))?;
+        self.fit(py, &mut state, u.layout, e.layout, Some(&told))?;
         let is_kept = state.law.recall(u.values()?, e.values()?, &told).or_raise()?;
         is_kept.then_some(()).ok_or_else(no_memory)
     }

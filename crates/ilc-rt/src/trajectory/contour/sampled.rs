@@ -75,6 +75,22 @@ impl<const N: usize> SampledPath<N> {
         Ok(Self { samples_m: samples_m.to_vec(), steps, index, piece_max_m })
     }
 
+    /// Returns the distance of each point to the whole path through the samples of a reference.
+    ///
+    /// # Shapes
+    /// - `reference_m`, `actual_m`: rows of `N` coordinates; returns one distance per row of `actual_m`, NaN for one
+    ///   that is not finite
+    /// # Errors
+    /// Those of [`SampledPath::new`].
+    pub fn contour_error_m(
+        reference_m: &[f64],
+        actual_m: &[f64],
+    ) -> Result<Vec<f64>, ContourError> {
+        let path = Self::new(reference_m.as_chunks().0)?;
+        let distance = |point| path.nearest(point).map_or(f64::NAN, |found| found.distance_m);
+        Ok(actual_m.as_chunks().0.iter().map(distance).collect())
+    }
+
     /// Returns the nearest point of the path; `None` for a point that is not finite.
     pub fn nearest(&self, point_m: &[f64; N]) -> Option<Nearest<N>> {
         if point_m.iter().any(|value| !value.is_finite()) {
