@@ -47,6 +47,7 @@ raise! {
     trajectory::program::GcodeError => exceptions::TrajectoryError,
     kinematics::KinematicsError => exceptions::KinematicsError,
     contour::ContourError => exceptions::ContourError,
+    model::identify::ResponseError => PyValueError,
     library::LibraryError => PyOSError,
     library::ElsewhereError => PyValueError,
     learning::batch::BatchError => exceptions::LearningError,

@@ -11,11 +11,11 @@ use pyo3::prelude::*;
 
 use crate::answer::{ByName, by_name, give_vector};
 use crate::argument::read_vector;
+use crate::arguments::Arguments;
 use crate::cell::PyCell;
 use crate::detached::computed;
 use crate::error::{OrRaise, Raised};
 use crate::identify::{give_measured, give_second_order, give_velocity_loop};
-use crate::whole::{Real, whole};
 
 /// Identify an axis of a cell by experiments, in narrower bands until a model fits.
 ///
@@ -79,20 +79,12 @@ pub(crate) fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> ByNam
 ///
 /// Returns signals, response, models, uncertainty and doubt by name.
 #[pyfunction]
-pub(crate) fn evaluate_experiment<'py>(
-    py: Python<'py>,
-    u: &Bound<'py, PyAny>,
-    y: &Bound<'py, PyAny>,
-    period_samples: &Bound<'py, PyAny>,
-    from_hz: Real,
-    to_hz: Real,
-    dt_s: Real,
-) -> ByName<'py> {
-    let (u, y) = (read_vector("u", u)?, read_vector("y", y)?);
-    let period_samples = whole("period_samples", period_samples)?;
-    let (band_hz, dt_s) = ((from_hz.0, to_hz.0), dt_s.0);
+pub(crate) fn evaluate_experiment<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
+    let (u, y, dt_s) = (a.vector("u")?, a.vector("y")?, a.number("dt_s")?);
+    let period_samples = a.whole("period_samples")?;
+    let band_hz = (a.number("from_hz")?, a.number("to_hz")?);
     let evaluate = || Identified::evaluate(u, y, period_samples, band_hz, dt_s, Form::Free);
-    describe(py, computed(py, evaluate)?)
+    describe(a.py(), computed(a.py(), evaluate)?)
 }
 
 /// Returns the figures of an experiment, as the arguments of `ilc_rt.experiment.Experiment`.

@@ -26,21 +26,7 @@ fn read_measured(a: Arguments<'_, '_>) -> PyResult<FrequencyResponse> {
     let response = read_complex("response", &a.get("response")?)?;
     let coherence = a.maybe("coherence", read_vector)?.unwrap_or_else(|| vec![1.0; n]);
     let n_averages = a.number("n_averages")?;
-    for (name, found) in [("response", response.len()), ("coherence", coherence.len())] {
-        if found != n {
-            let line =
-                format!("{name} has {found} entries; {n}, one for each frequency, are needed");
-            return Err(PyValueError::new_err(line));
-        }
-    }
-    if let Some(value) = coherence.iter().find(|value| !(0.0..=1.0).contains(*value)) {
-        return Err(PyValueError::new_err(format!("coherence holds {value}; allowed 0 to 1")));
-    }
-    if !(n_averages.is_finite() && n_averages >= 1.0) {
-        let line = format!("n_averages = {n_averages}; at least 1 is needed");
-        return Err(PyValueError::new_err(line));
-    }
-    Ok(FrequencyResponse { frequency_hz, response, coherence, n_averages })
+    FrequencyResponse { frequency_hz, response, coherence, n_averages }.checked().or_raise()
 }
 
 /// Returns a measured response by the names of `ilc_rt.fits.FrequencyResponse`.

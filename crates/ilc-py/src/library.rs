@@ -30,18 +30,14 @@ impl PyLibrary {
     }
 
     /// Return a part of the stored runs, oldest first, without their arrays.
-    #[pyo3(signature = (cell=None, campaign=None, limit=None, offset=0))]
-    fn _page<'py>(
-        &self,
-        py: Python<'py>,
-        cell: Option<String>,
-        campaign: Option<String>,
-        limit: Option<usize>,
-        offset: usize,
-    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let page = Page { cell, campaign, offset, limit };
-        let rows = self.read(py, |library| library.page(&page))?;
-        rows.iter().map(|row| describe(py, row)).collect()
+    fn _page<'py>(&self, a: Arguments<'_, 'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let page = read!(a, Page:
+            [maybe_text => cell, campaign]
+            limit: a.maybe("limit", |_, limit| limit.extract())?,
+            offset: a.get("offset")?.extract()?,
+        );
+        let rows = self.read(a.py(), |library| library.page(&page))?;
+        rows.iter().map(|row| describe(a.py(), row)).collect()
     }
 
     /// Return the number of stored runs.

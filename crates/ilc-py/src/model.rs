@@ -63,11 +63,8 @@ impl From<StateSpace> for PyStateSpace {
     }
 }
 
-/// A new model, or the refusal of what it was to be made of.
-type NewModel = Result<StateSpace, ModelError>;
-
 /// Returns a new model to Python.
-fn give(model: NewModel) -> PyResult<PyStateSpace> {
+fn give(model: Result<StateSpace, ModelError>) -> PyResult<PyStateSpace> {
     model.or_raise().map(PyStateSpace::from)
 }
 
