@@ -5,7 +5,7 @@
 
 use std::ffi::CString;
 
-use ilc_rt::learning::analysis::{self, Analysis, Method, Question, Uncertainty};
+use ilc_rt::learning::analysis::{self, Analysis, Question, Uncertainty};
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
 use ilc_rt::learning::tune::{Knowledge, TuningStep, tune as propose};
 use ilc_rt::learning::{self, Law};
@@ -60,17 +60,13 @@ fn figures<'py>(py: Python<'py>, found: &Analysis, model: &StateSpace) -> ByName
         let values = values.clone();
         values.map(|values| give_signal(py, values, n_channels, false)).transpose()
     };
-    let method = match found.method {
-        Method::Dense => "dense",
-        Method::Structured => "structured",
-    };
     let (factor, condition) = (found.monotonic_factor, found.pd_condition.as_ref());
     Ok(by_name!(py,
         [found => n_samples, converges, monotonic, why, transient_growth]
         [found => critical_frequency_hz, learnable_frequency_hz]
         [found => robust_factor, robust_lifted, uncertainty_allowed]
         [found => initial_error_rms, converged_error_rms, expected_rms_limit]
-        method: method,
+        method: found.method.name(),
         spectral_radius: found.spectral_radius.value,
         spectral_radius_error: found.spectral_radius.error,
         monotonic_factor: factor.map(|factor| factor.value),
@@ -92,7 +88,7 @@ pub(crate) fn refuse_divergent(a: Arguments<'_, '_>) -> PyResult<()> {
     if laws::is_python(&law)? {
         return Ok(());
     }
-    let mut law = laws::apart("law", &law, n_samples, channels(&model), 0)?;
+    let mut law = laws::apart("law", &law, n_samples, Channels::of(&model), 0)?;
     let found = computed(a.py(), || {
         analysis::refuse_divergent(law.as_mut(), &model, n_samples)?;
         analysis::overreach(law.as_mut(), &model, n_samples)
@@ -100,10 +96,6 @@ pub(crate) fn refuse_divergent(a: Arguments<'_, '_>) -> PyResult<()> {
     let Some(found) = found else { return Ok(()) };
     let message = CString::new(found.to_string())?;
     PyErr::warn(a.py(), &a.py().get_type::<PyUserWarning>(), &message, 2)
-}
-
-fn channels(model: &StateSpace) -> Channels {
-    Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
 }
 
 /// Reads a number or a list of gains.
@@ -124,10 +116,8 @@ fn read_reference(
 ) -> PyResult<Option<Signal>> {
     a.maybe("reference", |name, given| {
         let signal = Signal::read(name, given)?.with_channels(name, model.n_outputs())?;
-        match n_samples {
-            Some(n_samples) => signal.with_samples(name, n_samples),
-            None => Ok(signal),
-        }
+        let n_samples = n_samples.unwrap_or(signal.n_samples);
+        signal.with_samples(name, n_samples)
     })
 }
 
@@ -162,7 +152,7 @@ fn read_law(
             object.repr()?
         )));
     }
-    laws::apart("law", object, n_samples, channels(model), 0)
+    laws::apart("law", object, n_samples, Channels::of(model), 0)
 }
 
 #[pyfunction]

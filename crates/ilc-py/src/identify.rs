@@ -59,11 +59,7 @@ pub(crate) fn frequency_response<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
             return Err(PyValueError::new_err(line));
         }
         (Some(period_samples), None) => Averaging::Periods { period_samples },
-        (None, segment_samples) => {
-            let segment_samples = segment_samples.unwrap_or(u.len() / 8);
-            let overlap_samples = overlap_samples.unwrap_or(segment_samples / 2);
-            Averaging::Welch { segment_samples, overlap_samples }
-        }
+        (None, segment_samples) => Averaging::welch(u.len(), segment_samples, overlap_samples),
     };
     let found = computed(a.py(), || identify::frequency_response(&u, &y, dt_s, averaging))?;
     give_measured(a.py(), found)

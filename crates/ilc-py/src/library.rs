@@ -46,12 +46,7 @@ impl PyLibrary {
     }
 
     /// Return runs with their arrays, unchecked, to be stored elsewhere.
-    fn _rows<'py>(
-        &self,
-        py: Python<'py>,
-        ids: &Bound<'py, PyAny>,
-    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let ids: Vec<i64> = ids.extract()?;
+    fn _rows<'py>(&self, py: Python<'py>, ids: Vec<i64>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let rows = self.read(py, |library| {
             ids.iter().map(|id| library.load_unchecked(*id)).collect::<Result<Vec<_>, _>>()
         })?;
@@ -66,8 +61,7 @@ impl PyLibrary {
     }
 
     /// Delete runs in one transaction.
-    fn _remove(&self, py: Python<'_>, ids: &Bound<'_, PyAny>) -> PyResult<()> {
-        let ids: Vec<i64> = ids.extract()?;
+    fn _remove(&self, py: Python<'_>, ids: Vec<i64>) -> PyResult<()> {
         self.write(py, |library| library.remove(&ids))
     }
 

@@ -9,6 +9,7 @@ use pyo3::types::PyBool;
 use crate::argument::{Matrix, read_matrix, read_vector};
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
+use crate::python_law::Channels;
 use crate::time_varying::PyTimeVarying;
 use crate::whole::number;
 
@@ -84,12 +85,8 @@ impl AnyModel {
         }
     }
 
-    pub(crate) fn n_inputs(&self) -> usize {
-        self.plant().at(0).n_inputs()
-    }
-
-    pub(crate) fn n_outputs(&self) -> usize {
-        self.plant().at(0).n_outputs()
+    pub(crate) fn channels(&self) -> Channels {
+        Channels::of(self.plant().at(0))
     }
 }
 

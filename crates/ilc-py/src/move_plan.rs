@@ -78,24 +78,10 @@ impl PyMovePlan {
         if shape.len() > 1 {
             return Err(misfit("t_s", &shape, "() or (n_times,)"));
         }
-        let n_axes = self.0.n_axes();
-        let evaluated = || {
-            let mut tables = [(); 3].map(|()| Vec::with_capacity(times_s.len() * n_axes));
-            for t_s in &times_s {
-                let state = self.0.at(*t_s);
-                let values = [state.position_m, state.velocity_m_s, state.acceleration_m_s2];
-                for (table, values) in tables.iter_mut().zip(values) {
-                    table.extend_from_slice(&values[..n_axes]);
-                }
-            }
-            tables
-        };
+        let evaluated = || self.0.tables_at(&times_s);
         let tables = if times_s.len() <= FEW { evaluated() } else { detached(py, evaluated) };
-        let given: Vec<Bound<'py, PyAny>> = tables
-            .into_iter()
-            .map(|table| give_signal(py, table, n_axes, shape.is_empty()))
-            .collect::<PyResult<_>>()?;
-        PyTuple::new(py, given)
+        let give = |table| give_signal(py, table, self.n_axes(), shape.is_empty());
+        PyTuple::new(py, tables.into_iter().map(give).collect::<PyResult<Vec<_>>>()?)
     }
 
     fn __repr__(&self) -> String {

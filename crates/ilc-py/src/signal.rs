@@ -145,12 +145,10 @@ fn switched(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
     let cutoffs_hz = a.vector("cutoffs_hz")?;
     let starts = a.get("starts")?;
     let starts = each("starts", &starts, "a sequence of samples", |start| whole("starts", start))?;
-    if cutoffs_hz.len() != starts.len() {
-        return Err(exceptions::SignalError::new_err(format!(
-            "{} cutoffs_hz for {} starts; as many are needed",
-            cutoffs_hz.len(),
-            starts.len()
-        )));
+    let (n_cutoffs, n_starts) = (cutoffs_hz.len(), starts.len());
+    if n_cutoffs != n_starts {
+        let line = format!("{n_cutoffs} cutoffs_hz for {n_starts} starts; as many are needed");
+        return Err(exceptions::SignalError::new_err(line));
     }
     let segments = starts.into_iter().zip(cutoffs_hz);
     let segments: Vec<_> =

@@ -77,14 +77,11 @@ pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
         return Err(refused(name, object, "a number"));
     }
     object.extract::<f64>().map_err(|error| {
-        let py = object.py();
-        if error.is_instance_of::<PyOverflowError>(py) {
-            let text = shown(object);
-            return PyValueError::new_err(format!(
-                "{name} = {text}; only finite numbers are allowed"
-            ));
+        if !error.is_instance_of::<PyOverflowError>(object.py()) {
+            return refused(name, object, "a number");
         }
-        refused(name, object, "a number")
+        let line = format!("{name} = {}; only finite numbers are allowed", shown(object));
+        PyValueError::new_err(line)
     })
 }
 

@@ -1,7 +1,7 @@
 //! Builders of wrappers: `gate`, `ladder`, `through_jacobian`.
 
 use ilc_rt::learning::Law;
-use ilc_rt::learning::gate::{Gate, GateRule, GateState, Measure};
+use ilc_rt::learning::gate::{Gate, GateRule, Measure};
 use ilc_rt::learning::ladder::{Ladder, LadderRule};
 use ilc_rt::learning::law::through_jacobian::ThroughJacobian;
 use pyo3::prelude::*;
@@ -21,11 +21,7 @@ type Inner = Box<dyn Law>;
 
 readable! {
     Gate<Inner> as law =>
-    state: Text(match law.state() {
-        GateState::Learning => "learning",
-        GateState::Holding => "holding",
-        GateState::RolledBack => "rolled_back",
-    }),
+    state: Text(law.state().name()),
     best_error: Number(law.best_figure()),
     best_input: Input(law.best_figure().map(|_| law.best_input().to_vec()));
 }

@@ -83,9 +83,8 @@ fn read_limits(
     }
     let length = object.len()?;
     if length != 2 {
-        return Err(PyValueError::new_err(format!(
-            "{name} has {length} sides; a pair (lower, upper) is needed"
-        )));
+        let line = format!("{name} has {length} sides; a pair (lower, upper) is needed");
+        return Err(PyValueError::new_err(line));
     }
     let side = |place: usize, unbounded: f64| -> PyResult<Limit> {
         let given = object.get_item(place)?;

@@ -22,9 +22,9 @@ impl Figure {
             Self::Number(value) => value.into_pyobject(py)?,
             Self::Count(value) => value.into_pyobject(py)?.into_any(),
             Self::Text(value) => value.into_pyobject(py)?.into_any(),
-            Self::Input(None) => py.None().into_bound(py),
-            Self::Input(Some(values)) => {
-                give_signal(py, values, n_inputs, is_flat && n_inputs == 1)?
+            Self::Input(values) => {
+                let give = |values| give_signal(py, values, n_inputs, is_flat && n_inputs == 1);
+                values.map(give).transpose()?.into_pyobject(py)?
             }
         })
     }

@@ -49,8 +49,8 @@ pub(super) fn error_feedforward(call: &Call<'_, '_>) -> PyResult<Built> {
 pub(super) fn modelled(call: &Call<'_, '_>) -> PyResult<(StateSpace, usize, Fits)> {
     let model = call.arguments.model("model")?;
     let n_samples = call.arguments.whole("n_samples")?;
-    let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
-    Ok((model, n_samples, Fits::Fixed(n_samples, channels)))
+    let fits = Fits::Fixed(n_samples, Channels::of(&model));
+    Ok((model, n_samples, fits))
 }
 
 pub(super) fn adjoint(call: &Call<'_, '_>) -> PyResult<Built> {

@@ -248,13 +248,10 @@ impl PyLaw {
         let State { law, copies, .. } = &mut *state;
         let learned = signals.exchange(py, law.as_mut(), copies, has_inner)?;
         drop(state);
-        match learned {
-            Ok(next) => Ok(next),
-            Err(error) => match self.frame.take_raised() {
-                Some(raised) => Err(raised),
-                None => Err(error).or_raise(),
-            },
-        }
+        learned.or_else(|error| match self.frame.take_raised() {
+            Some(raised) => Err(raised),
+            None => Err(error).or_raise(),
+        })
     }
 
     /// Announce a run before it begins: the first one, or one that is not learned from.
@@ -301,10 +298,8 @@ impl PyLaw {
         let found = state.law.figure(name);
         let n_inputs = state.size.unwrap_or(Size::ONE).channels.n_inputs;
         drop(state);
-        match found {
-            Some(found) => found.give(py, n_inputs, self.frame.is_flat()),
-            None => Err(PyAttributeError::new_err(format!("this law has no {name}"))),
-        }
+        let missing = || PyAttributeError::new_err(format!("this law has no {name}"));
+        found.ok_or_else(missing)?.give(py, n_inputs, self.frame.is_flat())
     }
 
     /// Add an earlier run, or one made elsewhere, to the memory.

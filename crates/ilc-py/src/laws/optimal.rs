@@ -13,7 +13,6 @@ use crate::argument::{Matrix, misfit};
 use crate::arguments::Arguments;
 use crate::error::OrRaise;
 use crate::model_argument::{AnyModel, read_any_model, read_model};
-use crate::python_law::Channels;
 use crate::weights::{read_contour, read_formation_weight, read_matrices};
 
 /// The laws of this file.
@@ -33,15 +32,16 @@ readable! { DynamicNormOptimal as law => conditioning: Number(law.inner().condit
 pub(super) fn plain(call: &Call<'_, '_>) -> PyResult<Built> {
     let model = read_any_model("model", &call.arguments.get("model")?)?;
     let n_samples = call.arguments.whole("n_samples")?;
-    let q = call.arguments.weight("q", n_samples, model.n_outputs())?;
+    let q = call.arguments.weight("q", n_samples, model.channels().n_outputs)?;
     build(call, &model, n_samples, q, None)
 }
 
 pub(super) fn contour(call: &Call<'_, '_>) -> PyResult<Built> {
     let model = read_any_model("model", &call.arguments.get("model")?)?;
     let (q, n_samples, p) = read_contour(call.arguments)?;
-    if p != model.n_outputs() {
-        let rule = format!("(n_samples, {}), one column an output,", model.n_outputs());
+    let n_outputs = model.channels().n_outputs;
+    if p != n_outputs {
+        let rule = format!("(n_samples, {n_outputs}), one column an output,");
         return Err(misfit("reference", &[n_samples, p], &rule));
     }
     build(call, &model, n_samples, q, None)
@@ -78,7 +78,7 @@ fn build(
     q: Weight,
     filters: Option<(&Dynamic, &InputWeights)>,
 ) -> PyResult<Built> {
-    let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
+    let channels = model.channels();
     let cost = read_cost(call.arguments, q, n_samples, channels.n_inputs)?;
     let (plant, fits) = (model.plant(), Fits::Fixed(n_samples, channels));
     let Some(filters) = filters else {
@@ -101,7 +101,7 @@ pub(super) fn read_cost(
 /// Reads the filter of the error, by default none, its coupling and the weight of the unfiltered error.
 fn read_dynamic(a: Arguments<'_, '_>, model: &AnyModel, n_samples: usize) -> PyResult<Dynamic> {
     let coupling = a.maybe("coupling", read_matrices)?;
-    let size = coupling.as_ref().map_or(model.n_outputs(), |matrices| matrices[0].nrows());
+    let size = coupling.as_ref().map_or(model.channels().n_outputs, |matrices| matrices[0].nrows());
     let none = || {
         let dt_s = model.plant().at(0).dt_s();
         StateSpace::static_gain(Matrix::identity(size, size), dt_s).or_raise()

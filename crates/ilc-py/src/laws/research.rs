@@ -17,7 +17,6 @@ use crate::argument::{Layout, Signal};
 use crate::arguments::read;
 use crate::error::OrRaise;
 use crate::model_argument::read_any_model;
-use crate::python_law::Channels;
 
 /// The laws of this file.
 pub(super) const BUILDERS: &[Builder] = &[
@@ -39,7 +38,7 @@ fn parametric(call: &Call<'_, '_>) -> PyResult<Built> {
     let model = read_any_model("model", &a.get("model")?)?;
     let Signal { values, layout } = a.signal("signals")?;
     let Layout { n_samples, n_channels, .. } = layout;
-    let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
+    let channels = model.channels();
     let of_input = (n_channels / channels.n_inputs).max(1);
     let term = |column: usize| Term {
         input: column / of_input,

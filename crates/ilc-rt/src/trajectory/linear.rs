@@ -181,6 +181,25 @@ impl Linear {
         self.n_axes
     }
 
+    /// Evaluates positions, velocities and accelerations at any times from the start.
+    ///
+    /// # Shapes
+    /// - each `n_times` x `n_axes`, time first
+    /// # Real Time
+    /// Cold: allocates.
+    pub fn tables_at(&self, times_s: &[f64]) -> [Vec<f64>; 3] {
+        let n_axes = self.n_axes();
+        let mut tables = [(); 3].map(|()| Vec::with_capacity(times_s.len() * n_axes));
+        for t_s in times_s {
+            let state = self.at(*t_s);
+            let values = [state.position_m, state.velocity_m_s, state.acceleration_m_s2];
+            for (table, values) in tables.iter_mut().zip(values) {
+                table.extend_from_slice(&values[..n_axes]);
+            }
+        }
+        tables
+    }
+
     /// Samples the motion, see [`SampledMotion::sample`].
     ///
     /// # Real Time
