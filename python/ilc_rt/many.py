@@ -138,9 +138,10 @@ def simulate_many(
         raise ValueError(message)
     seeds = [case_seed(seed, number) for number in range(len(models))] if noise_std else []
     found = _native.simulate_many({
-        "plants": models, "reference": r.reshape(-1), "initial_input": u.reshape(-1), "n_samples": len(r),
-        "trials": trials, "laws": laws, "law_of_plant": law_of_plant, "noise_std": float(noise_std),
-        "seeds": seeds, "threads": _available() if threads is None else threads,
+        "plants": models, "reference": r.reshape(-1), "initial_input": u.reshape(-1),
+        "n_samples": len(r), "trials": trials, "laws": laws, "law_of_plant": law_of_plant,
+        "noise_std": float(noise_std), "seeds": seeds,
+        "threads": _available() if threads is None else threads,
         "disturbance": _measured(disturbance, trials),
         "output_disturbance": _added(output_disturbance, trials, r.shape),
         "kept_errors": kept_errors, "kept_inputs": kept_inputs,

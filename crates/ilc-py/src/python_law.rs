@@ -102,7 +102,9 @@ impl PythonLaw {
         let given = self.frame.disturbance.lock().unwrap_or_else(PoisonError::into_inner).take();
         let announced = self.next_disturbance.take();
         let disturbance = if let Some(given) = given {
-            announced.into_iter().for_each(|announced| self.announce(py, announced));
+            if let Some(announced) = announced {
+                self.announce(py, announced);
+            }
             Some(given.into_bound(py))
         } else {
             announced.map(|values| give_vector(py, values))

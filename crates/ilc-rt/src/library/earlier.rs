@@ -109,7 +109,7 @@ mod tests {
     use crate::learning::law::q_filter::QFilter;
     use crate::learning::law::relevance::{RelevanceWeights, RunShape};
 
-    /// A library of three runs, of which the second is deleted once they have been found.
+    /// Three runs of a library; the second is deleted once they have been found.
     fn earlier() -> Earlier {
         let library = Arc::new(Held::new(":memory:".into()).unwrap());
         for index in 0..3 {
