@@ -26,3 +26,18 @@ pub fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
     })?;
     Ok(in_process(&cell.bus.address, machine, cell.cell.cycle_us, ANSWERS))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_in_this_process_needs_no_other_and_an_unknown_one_is_refused() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut cell = Cell::load(&root.join("../examples/01_gantry.toml")).unwrap();
+        cell.bus.address = "loopback:".to_owned();
+        assert!(open(&cell).is_ok());
+        cell.bus.address = "nowhere:".to_owned();
+        assert!(matches!(open(&cell), Err(CampaignError::Bus { .. })));
+    }
+}

@@ -64,3 +64,27 @@ impl Held {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{meta, record};
+    use super::*;
+
+    #[test]
+    fn a_new_file_is_created_and_opened_for_each_operation() {
+        let path = std::env::temp_dir().join(format!("ilc-held-{}.db", std::process::id()));
+        let held = Held::new(path.clone()).unwrap();
+        assert!(path.exists());
+        for held in [held, Held::new(IN_MEMORY.into()).unwrap()] {
+            held.write(|library| library.append(&meta("a"), &record(0))).unwrap();
+            assert_eq!(held.read(|library| library.count(None)).unwrap(), 1);
+        }
+        assert_eq!(
+            Held::new(path.clone()).unwrap().read(|library| library.count(None)).unwrap(),
+            1
+        );
+        std::fs::remove_file(&path).unwrap();
+        let refused = Held::new(std::env::temp_dir()).unwrap_err();
+        assert!(!matches!(refused, LibraryError::Missing { .. }), "{refused}");
+    }
+}

@@ -211,6 +211,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn values_are_the_blocks_of_all_samples() {
+        let weight = Weight::PerSample(vec![1.0, 4.0]);
+        assert_eq!(weight.values(2, 2).unwrap(), [1.0, 0.0, 0.0, 1.0, 4.0, 0.0, 0.0, 4.0]);
+        let many = Weight::Scalar(1.0).values(VALUES_MAX / 4 + 1, 2).unwrap_err();
+        assert!(matches!(many, LearningError::TooMany { allowed: 25_000_000, .. }), "{many}");
+        let large = Weight::PerSample(vec![1.0, f64::INFINITY]).values(2, 1).unwrap_err();
+        assert!(matches!(large, LearningError::Weight { sample: 1, .. }), "{large}");
+    }
+
+    #[test]
     fn each_form_gives_its_matrix() {
         let block = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 3.0]);
         assert_eq!(Weight::Scalar(3.0).at(4, 2), DMatrix::identity(2, 2) * 3.0);

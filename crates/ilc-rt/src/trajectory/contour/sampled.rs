@@ -151,6 +151,17 @@ mod tests {
     use super::*;
     use crate::interpolate::random::Random;
 
+    #[test]
+    fn points_have_their_distances_to_the_whole_path() {
+        let reference_m = [0.0, 0.0, 1.0, 0.0];
+        let found =
+            SampledPath::<2>::contour_error_m(&reference_m, &[0.5, 0.25, 1.0, -3.0, f64::NAN, 0.0]);
+        let found = found.unwrap();
+        assert_eq!(found[..2], [0.25, 3.0]);
+        assert!(found[2].is_nan() && found.len() == 3);
+        assert!(SampledPath::<2>::contour_error_m(&[], &[0.0, 0.0]).is_err());
+    }
+
     fn exhaustive<const N: usize>(path: &SampledPath<N>, point_m: &[f64; N]) -> f64 {
         (0..path.samples_m.len() - 1)
             .map(|step| path.on_step(point_m, step).distance_m)
