@@ -15,12 +15,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answer::{ByName, by_name, give_signal, give_vector};
-use crate::argument::{Signal, misfit, read_array, read_vector};
+use crate::argument::{Channels, Signal, misfit, read_array, read_vector};
 use crate::arguments::Arguments;
 use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::laws;
-use crate::python_law::Channels;
 use crate::whole::{number, whole};
 
 #[pyfunction]

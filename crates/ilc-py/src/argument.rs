@@ -2,12 +2,27 @@
 
 use std::ops::Deref;
 
+use ilc_rt::model::StateSpace;
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// The matrix type of `ilc-rt`.
 pub(crate) type Matrix = nalgebra::DMatrix<f64>;
+
+/// Channels of the input and of the output or error, of a model or a law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Channels {
+    pub(crate) n_inputs: usize,
+    pub(crate) n_outputs: usize,
+}
+
+impl Channels {
+    /// Returns the channels of a model.
+    pub(crate) fn of(model: &StateSpace) -> Self {
+        Self { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
+    }
+}
 
 /// Samples and channels of a signal, and true if it has a channel axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,6 @@
 //! For every family of this crate: each argument is read, and refused, under its own name.
 //! Signatures, defaults and documentation are those of the Python package.
 
-use ilc_rt::learning::law::q_filter::QFilter;
 use ilc_rt::learning::weights::Weight;
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -13,7 +12,6 @@ use pyo3::{Borrowed, CastError};
 
 use crate::argument::{Matrix, Signal, misfit, read_array, read_pair, read_vector};
 use crate::model_argument::read_model;
-use crate::signal::read_filter;
 use crate::whole::{each, finite, number, pair, positive, refused, shown, whole};
 
 /// The arguments of one call by name, handed over in a dict.
@@ -156,11 +154,6 @@ impl<'a, 'py> Arguments<'a, 'py> {
     /// Reads a signal.
     pub(crate) fn signal(self, name: &str) -> PyResult<Signal> {
         Signal::read(name, &self.get(name)?)
-    }
-
-    /// Reads a filter, an array of taps, or no filter.
-    pub(crate) fn filter(self, name: &str) -> PyResult<QFilter> {
-        read_filter(name, self.given(name)?.as_ref())
     }
 
     /// Reads a weight: a number, `(n,)`, `(p, p)` or `(n, p, p)`.

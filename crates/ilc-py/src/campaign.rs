@@ -14,11 +14,11 @@ use ilc_rt::record::Event;
 use pyo3::exceptions::{PyBaseException, PyValueError};
 use pyo3::prelude::*;
 
-use crate::argument::read_disturbance;
+use crate::argument::{Channels, read_disturbance};
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::python_law::{Channels, Frame, PythonLaw};
+use crate::python_law::{Frame, PythonLaw};
 
 /// Capacity of events towards Python; a full queue makes the campaign wait.
 const EVENTS: usize = 64;

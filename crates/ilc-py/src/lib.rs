@@ -5,7 +5,7 @@
 //!
 //! Family: `laws` and `python_law` call each other: an inner law may be written in Python.
 //!
-//! Family: `arguments`, `model`, `model_argument` and `signal` read each other's arguments.
+//! Family: `arguments`, `model` and `model_argument` read each other's arguments.
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 #![expect(

@@ -6,12 +6,11 @@ use ilc_rt::learning::batch::{self, Laws, Task};
 use pyo3::prelude::*;
 
 use crate::answer::{ByName, by_name, give_vector};
-use crate::argument::{read_disturbance, read_vector};
+use crate::argument::{Channels, read_disturbance, read_vector};
 use crate::arguments::Arguments;
 use crate::detached::computed;
 use crate::laws::apart;
 use crate::model_argument::read_model;
-use crate::python_law::Channels;
 use crate::whole::{each, whole};
 
 #[pyfunction]

@@ -6,10 +6,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
-use crate::argument::{Matrix, read_matrix, read_vector};
+use crate::argument::{Channels, Matrix, read_matrix, read_vector};
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
-use crate::python_law::Channels;
 use crate::time_varying::PyTimeVarying;
 use crate::whole::number;
 

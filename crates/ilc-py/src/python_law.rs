@@ -5,28 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ilc_rt::learning::{Law, LearningError, Purpose, Standing};
-use ilc_rt::model::StateSpace;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::answer::{give_signal, give_vector};
-use crate::argument::Signal;
+use crate::argument::{Channels, Signal};
 use crate::laws::PyLaw;
 use crate::whole::shown;
-
-/// Channels of the signals passed to a Python object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Channels {
-    pub(crate) n_inputs: usize,
-    pub(crate) n_outputs: usize,
-}
-
-impl Channels {
-    /// Returns the channels of a model.
-    pub(crate) fn of(model: &StateSpace) -> Self {
-        Self { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
-    }
-}
 
 /// Data exchanged between a Python object and its caller, besides the signals.
 #[derive(Debug, Default)]

@@ -172,7 +172,7 @@ fn from_signal(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
 }
 
 /// Reads a filter, an array of taps, or no filter.
-pub(crate) fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyResult<QFilter> {
+fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyResult<QFilter> {
     let Some(object) = object else { return Ok(QFilter::None) };
     if let Ok(filter) = object.cast::<PyFilter>() {
         return Ok(filter.get().filter.clone());
@@ -185,6 +185,11 @@ pub(crate) fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyRe
         )));
     }
     Ok(QFilter::Fir(FirFilter::new(&read_vector(name, object)?).or_raise()?))
+}
+
+/// Reads such a filter from an argument.
+pub(crate) fn given_filter(a: Arguments<'_, '_>, name: &str) -> PyResult<QFilter> {
+    read_filter(name, a.given(name)?.as_ref())
 }
 
 fn without_lag(filter: &QFilter) -> QFilter {

@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 
 use super::figure::readable;
 use super::{Builder, Built, Call, Fits};
+use crate::argument::Channels;
 use crate::arguments::read;
-use crate::python_law::Channels;
 use crate::weights::read_matrices;
 
 /// The laws of this file.

@@ -9,8 +9,9 @@ use pyo3::prelude::*;
 
 use super::figure::readable;
 use super::{Builder, Built, Call, Fits, Size};
+use crate::argument::Channels;
 use crate::arguments::read;
-use crate::python_law::Channels;
+use crate::signal::given_filter;
 
 /// The laws of this file.
 pub(super) const BUILDERS: &[Builder] = &[
@@ -55,12 +56,14 @@ pub(super) fn modelled(call: &Call<'_, '_>) -> PyResult<(StateSpace, usize, Fits
 
 pub(super) fn adjoint(call: &Call<'_, '_>) -> PyResult<Built> {
     let (model, n_samples, fits) = modelled(call)?;
-    let (gain, filter) = (call.arguments.maybe_number("gain")?, call.arguments.filter("q_filter")?);
+    let (gain, filter) =
+        (call.arguments.maybe_number("gain")?, given_filter(call.arguments, "q_filter")?);
     call.built(fits, || Adjoint::new(&model, n_samples, gain, filter))
 }
 
 pub(super) fn model_inverse(call: &Call<'_, '_>) -> PyResult<Built> {
     let (model, n_samples, fits) = modelled(call)?;
-    let (gain, filter) = (call.arguments.number("gain")?, call.arguments.filter("q_filter")?);
+    let (gain, filter) =
+        (call.arguments.number("gain")?, given_filter(call.arguments, "q_filter")?);
     call.built(fits, || ModelInverse::new(&model, n_samples, gain, filter))
 }

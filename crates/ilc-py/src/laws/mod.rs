@@ -23,13 +23,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answer::{Array, ByName};
-use crate::argument::{Layout, read_disturbance};
+use crate::argument::{Channels, Layout, read_disturbance};
 use crate::arguments::Arguments;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
 use crate::made::reduce_kind;
-use crate::python_law::{Channels, Frame, PythonLaw};
+use crate::python_law::{Frame, PythonLaw};
+use crate::signal::given_filter;
 use crate::whole::whole;
 pub(crate) use apart::{apart, is_python, samples_of};
 use exchange::{Copies, Given, Signals};
@@ -102,7 +103,7 @@ impl<'py> Call<'_, 'py> {
 
     /// Returns the Q-filter of a law; a single sample is too short for any.
     fn filter(&self, name: &str) -> PyResult<QFilter> {
-        let filter = self.arguments.filter(name)?;
+        let filter = given_filter(self.arguments, name)?;
         Ok(if self.size.is_some() { filter } else { QFilter::None })
     }
 

@@ -10,12 +10,11 @@ use pyo3::prelude::*;
 
 use super::figure::readable;
 use super::{Builder, Built, Call, Fits, Size};
-use crate::argument::read_disturbance;
+use crate::argument::{Channels, read_disturbance};
 use crate::arguments::{Arguments, read};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
-use crate::python_law::Channels;
 use crate::whole::whole;
 
 /// The laws of this file.

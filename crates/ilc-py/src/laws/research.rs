@@ -17,6 +17,7 @@ use crate::argument::{Layout, Signal};
 use crate::arguments::read;
 use crate::error::OrRaise;
 use crate::model_argument::read_any_model;
+use crate::signal::given_filter;
 
 /// The laws of this file.
 pub(super) const BUILDERS: &[Builder] = &[
@@ -72,7 +73,7 @@ fn stable_inverse(call: &Call<'_, '_>) -> PyResult<Built> {
         [("stable_inversion", InverseMethod::StableInversion), ("zpetc", InverseMethod::Zpetc)];
     let method = a.choice("method", &methods)?;
     let rule = read!(a, InverseRule: [number => gain, zero_radius] method: method);
-    Built::of(fits, StableInverse::new(&model, n_samples, rule, a.filter("q_filter")?))
+    Built::of(fits, StableInverse::new(&model, n_samples, rule, given_filter(a, "q_filter")?))
 }
 
 fn model_free(call: &Call<'_, '_>) -> PyResult<Built> {
