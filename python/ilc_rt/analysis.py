@@ -290,7 +290,7 @@ def analyze(
     >>> analyze(PdIlc(kp=5.0, kd=0.0), axis, 200).converges
     False
     """
-    return Analysis(**_native.analyze(**locals()))
+    return Analysis(**_native.analyze(locals()))
 
 
 def refuse_divergent(law: AnyLaw, model: Model, n_samples: int) -> None:
@@ -329,7 +329,7 @@ def refuse_divergent(law: AnyLaw, model: Model, n_samples: int) -> None:
     Traceback (most recent call last):
     ilc_rt.LearningError: this law will not converge: ...
     """
-    _native.refuse_divergent(law=law, model=model, n_samples=n_samples)
+    _native.refuse_divergent(locals())
 
 
 def tune(
@@ -380,7 +380,7 @@ def tune(
     >>> tuning.q, tuning.s, tuning.r > 0
     (1.0, 0.0, True)
     """
-    found = _native.tune(**locals())
+    found = _native.tune(locals())
     found["analysis"] = Analysis(**found["analysis"])
     return Tuning(**found)
 

@@ -67,7 +67,7 @@ class Pid(_native.Pid):
         filter_s: float = 0.01,
         output_max: float | None = None,
     ) -> Self:
-        return super().__new__(cls, **given(locals()))
+        return super().__new__(cls, given(locals()))
 
 
 class Cascade(_native.Cascade):
@@ -120,7 +120,7 @@ class Cascade(_native.Cascade):
         velocity_max_m_s: float | None = None,
         force_max_n: float | None = None,
     ) -> Self:
-        return super().__new__(cls, **given(locals()))
+        return super().__new__(cls, given(locals()))
 
 
 class CrossCoupled(_native.CrossCoupled):
@@ -148,4 +148,4 @@ class CrossCoupled(_native.CrossCoupled):
         cls,
         controller: Pid,
     ) -> Self:
-        return super().__new__(cls, controller=controller)
+        return super().__new__(cls, given(locals()))

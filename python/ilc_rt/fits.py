@@ -27,9 +27,8 @@ __all__ = [
 def _frequencies(frequency_hz: ArrayLike) -> NDArray[np.float64]:
     """Return a one-dimensional array of finite frequencies."""
     given = np.zeros(np.shape(frequency_hz))
-    checked = _native.check_response(
-        frequency_hz=frequency_hz, response=given, coherence=None, n_averages=1.0
-    )
+    measured = {"frequency_hz": frequency_hz, "response": given, "n_averages": 1.0}
+    checked = _native.check_response(measured)
     return np.asarray(checked["frequency_hz"], np.float64)
 
 
@@ -99,7 +98,7 @@ class SecondOrderFit(_Fit):
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         """Return the response of the model, including the delay."""
-        return _native.second_order_response(frequency_hz, **vars(self))
+        return _native.second_order_response(frequency_hz, vars(self))
 
     def state_space(self) -> StateSpace:
         """Return the model in state space.
@@ -114,7 +113,7 @@ class SecondOrderFit(_Fit):
         ModelError
             If frequency or damping is invalid.
         """
-        return _native.second_order_model(**vars(self))
+        return _native.second_order_model(vars(self))
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ class VelocityLoopFit(_Fit):
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         """Return the response of the position loop, including the delay."""
-        return _native.velocity_loop_response(frequency_hz, **vars(self))
+        return _native.velocity_loop_response(frequency_hz, vars(self))
 
 
 @dataclass(frozen=True)
@@ -247,7 +246,7 @@ def fit_second_order(
     >>> round(fit.natural_frequency_hz, 6), round(fit.damping, 6), round(fit.delay_s, 6)
     (12.0, 0.5, 0.004)
     """
-    return SecondOrderFit(**_native.fit_second_order(**locals()))
+    return SecondOrderFit(**_native.fit_second_order(locals()))
 
 
 def fit_velocity_loop(
@@ -290,7 +289,7 @@ def fit_velocity_loop(
     ----------
     [pintelon2012], section 9.8.3.
     """
-    return VelocityLoopFit(**_native.fit_velocity_loop(**locals()))
+    return VelocityLoopFit(**_native.fit_velocity_loop(locals()))
 
 
 def fit_rational(
@@ -343,4 +342,4 @@ def fit_rational(
     >>> round(float(fit.model.poles()[0].real), 6)
     -4.0
     """
-    return RationalFit(**_native.fit_rational(**locals()))
+    return RationalFit(**_native.fit_rational(locals()))

@@ -302,9 +302,9 @@ def _excite_function(
         message = f"the function returned shape {y.shape}; {values.shape}, as its input, is needed"
         raise ValueError(message)
     used = slice(first, first + period * experiment.periods)
-    found = evaluate_experiment(
-        values[used], y[used], period, experiment.from_hz, experiment.to_hz, dt_s
-    )
+    band = {"from_hz": experiment.from_hz, "to_hz": experiment.to_hz}
+    signals = {"u": values[used], "y": y[used], "period_samples": period, "dt_s": dt_s}
+    found = evaluate_experiment(signals | band)
     return Identification(**_with_models(found), dt_s=dt_s, experiment=experiment)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ilc_rt import _native
 from ilc_rt._native import KinematicsError
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -54,7 +55,7 @@ class Delta(_native.Delta):
         crank_m: float = 0.060,
         rod_m: float = 0.145,
     ) -> Self:
-        return super().__new__(cls, base_m=base_m, crank_m=crank_m, rod_m=rod_m)
+        return super().__new__(cls, given(locals()))
 
 
 class Gantry(_native.Gantry):
@@ -87,4 +88,4 @@ class Gantry(_native.Gantry):
         cls,
         orthogonality_rad: float = 0.0,
     ) -> Self:
-        return super().__new__(cls, orthogonality_rad=orthogonality_rad)
+        return super().__new__(cls, given(locals()))

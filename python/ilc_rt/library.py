@@ -59,7 +59,7 @@ class Library(Closing, _native.Library):
     _path: str
 
     def __new__(cls, path: str | PathLike[str]) -> Self:
-        library = super().__new__(cls, path=fspath(path))
+        library = super().__new__(cls, {"path": fspath(path)})
         library._path = fspath(path)
         return library
 
@@ -99,7 +99,7 @@ class Library(Closing, _native.Library):
         OSError
             If the file cannot be read.
         """
-        return self._page(cell)
+        return self._page({"cell": cell, "offset": 0})
 
     def page(
         self,
@@ -139,7 +139,7 @@ class Library(Closing, _native.Library):
             if value is not None and value < 0:
                 message = f"{key} = {value}: a number of runs, 0 or more"
                 raise BadInputError(message)
-        return self._page(cell, campaign, limit, offset)
+        return self._page(given(locals()))
 
     def select(self, **wanted: Any) -> builtins.list[dict[str, Any]]:  # noqa: ANN401 (values of any key)
         """Return the runs whose entries have wanted values, oldest first.
@@ -338,7 +338,7 @@ class Library(Closing, _native.Library):
         >>> library.recall(20.0)[0]["distance"]
         1.5
         """
-        return super()._append(**given(locals()))
+        return super()._append(given(locals()))
 
     def trim(self, keep: int, cell: str | None = None, *, progress: Progress | None = None) -> int:
         """Delete all but the most relevant runs, and return how many were deleted.

@@ -137,14 +137,15 @@ def simulate_many(
         message = f"keep = {keep!r}: {n_values} numbers; at most {VALUES_MAX} are kept"
         raise ValueError(message)
     seeds = [case_seed(seed, number) for number in range(len(models))] if noise_std else []
-    found = _native.simulate_many(
-        plants=models, reference=r.reshape(-1), initial_input=u.reshape(-1), n_samples=len(r),
-        trials=trials, laws=laws, law_of_plant=law_of_plant, noise_std=float(noise_std),
-        seeds=seeds, threads=_available() if threads is None else threads,
-        disturbance=_measured(disturbance, trials),
-        output_disturbance=_added(output_disturbance, trials, r.shape),
-        kept_errors=kept_errors, kept_inputs=kept_inputs,
-    )  # fmt: skip
+    found = _native.simulate_many({
+        "plants": models, "reference": r.reshape(-1), "initial_input": u.reshape(-1),
+        "n_samples": len(r), "trials": trials, "laws": laws, "law_of_plant": law_of_plant,
+        "noise_std": float(noise_std), "seeds": seeds,
+        "threads": _available() if threads is None else threads,
+        "disturbance": _measured(disturbance, trials),
+        "output_disturbance": _added(output_disturbance, trials, r.shape),
+        "kept_errors": kept_errors, "kept_inputs": kept_inputs,
+    })  # fmt: skip
     figures = (len(models), trials)
     errors = found["errors"].reshape(len(models), kept_errors, *r.shape)
     inputs = found["inputs"].reshape(len(models), kept_inputs, *u.shape)

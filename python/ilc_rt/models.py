@@ -45,7 +45,7 @@ def from_transfer_function(num: ArrayLike, den: ArrayLike, dt_s: float | None = 
     >>> from_transfer_function([1.0], [1.0, -0.5], 0.001).simulate([1.0, 0.0, 0.0])
     array([0. , 1. , 0.5])
     """
-    return _native.from_transfer_function(num=num, den=den, dt_s=dt_s)
+    return _native.from_transfer_function(locals())
 
 
 def second_order(natural_frequency_rad_s: float, damping: float) -> StateSpace:
@@ -80,7 +80,7 @@ def second_order(natural_frequency_rad_s: float, damping: float) -> StateSpace:
     >>> discretize(second_order(157.0, 0.5), 0.002)
     StateSpace(n_states=2, n_inputs=1, n_outputs=1, dt_s=0.002)
     """
-    return _native.second_order(natural_frequency_rad_s=natural_frequency_rad_s, damping=damping)
+    return _native.second_order(locals())
 
 
 def discretize(model: Model, dt_s: float, method: Literal["zoh", "tustin"] = "zoh") -> StateSpace:
@@ -116,4 +116,4 @@ def discretize(model: Model, dt_s: float, method: Literal["zoh", "tustin"] = "zo
     >>> discretize(lag, 0.1).dt_s
     0.1
     """
-    return _native.discretize(model=model, dt_s=dt_s, method=method)
+    return _native.discretize(locals())

@@ -56,7 +56,7 @@ class FrequencyResponse:
         coherence: ArrayLike | None = None,
         n_averages: float = 1.0,
     ) -> None:
-        checked = _native.check_response(**given(locals()))
+        checked = _native.check_response(given(locals()))
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
@@ -74,7 +74,7 @@ class FrequencyResponse:
         ----------
         [bendat2010], section 9.2.
         """
-        return _native.relative_deviation(**vars(self))
+        return _native.relative_deviation(vars(self))
 
     def band(self, from_hz: float, to_hz: float) -> FrequencyResponse:
         """Return the part within a band, both ends included.
@@ -190,7 +190,7 @@ def frequency_response(
     >>> np.allclose(h, 3.0)
     True
     """
-    found = _native.frequency_response(**locals())
+    found = _native.frequency_response(locals())
     return FrequencyResponse(**found)
 
 
@@ -231,7 +231,7 @@ def uncertainty(
     >>> uncertainty(FrequencyResponse([1.0, 2.0], [1.0, 1.1]), [1.0, 1.0])[1].round(3)
     array([0. , 0.1])
     """
-    return _native.uncertainty(**_parts(measured), model=model, deviations=deviations)
+    return _native.uncertainty(_parts(measured) | {"model": model, "deviations": deviations})
 
 
 def excitation(
@@ -287,7 +287,7 @@ def excitation(
     >>> values.shape, first, period
     ((24000,), 0, 8000)
     """
-    return _native.excitation(**locals())
+    return _native.excitation(locals())
 
 
 def _parts(measured: FrequencyResponse) -> dict[str, object]:

@@ -80,7 +80,7 @@ class ButterworthFilter(_Filter):
     causal: bool
 
     def __new__(cls, order: int, cutoff_hz: float, dt_s: float, causal: bool = False) -> Self:  # noqa: FBT001
-        return super().__new__(cls, "butterworth", **given(locals()))
+        return super().__new__(cls, "butterworth", given(locals()))
 
     @property
     def sos(self) -> NDArray[np.float64]:
@@ -147,7 +147,7 @@ class GaussianFilter(_Filter):
     sigma_samples: float
 
     def __new__(cls, bandwidth_hz: float, dt_s: float) -> Self:
-        return super().__new__(cls, "gaussian", bandwidth_hz=bandwidth_hz, dt_s=dt_s)
+        return super().__new__(cls, "gaussian", given(locals()))
 
 
 class FirFilter(_Filter):
@@ -187,7 +187,7 @@ class FirFilter(_Filter):
     repeats: int
 
     def __new__(cls, taps: ArrayLike, repeats: int = 1) -> Self:
-        return super().__new__(cls, "fir", taps=taps, repeats=repeats)
+        return super().__new__(cls, "fir", given(locals()))
 
 
 class SwitchedFilter(_Filter):
@@ -241,7 +241,7 @@ class SwitchedFilter(_Filter):
         order: int = 2,
         blend: int = 0,
     ) -> Self:
-        return super().__new__(cls, "switched", **given(locals()))
+        return super().__new__(cls, "switched", given(locals()))
 
     @classmethod
     def from_signal(
@@ -293,7 +293,7 @@ class SwitchedFilter(_Filter):
         ----------
         [filter-based], Section 5.
         """
-        return super().__new__(cls, "from_signal", **given(locals()))
+        return super().__new__(cls, "from_signal", given(locals()))
 
 
 def butterworth(
@@ -371,7 +371,7 @@ def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]:
     >>> float(signal.instantaneous_frequency(x, 0.002)[100].round(9))
     8.0
     """
-    return _native.instantaneous_frequency(x=x, dt_s=dt_s)
+    return _native.instantaneous_frequency(locals())
 
 
 def zero_phase(filter: Filter | ArrayLike, x: ArrayLike) -> NDArray[np.float64]:

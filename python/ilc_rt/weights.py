@@ -78,7 +78,7 @@ def contour(
     >>> weights.contour(line, q=0.0, contour=2.0)[2].round(12).tolist()
     [[1.0, -1.0], [-1.0, 1.0]]
     """
-    return _native.contour_weights(**locals())
+    return _native.contour_weights(locals())
 
 
 def coupled(
@@ -120,7 +120,7 @@ def coupled(
     >>> weights.coupled(coupling, sigma=2.0, gamma=0.0)[0].round(12).tolist()
     [[0.72, -0.96], [-0.96, 1.28]]
     """
-    return _native.coupled_weights(coupling=coupling, sigma=sigma, gamma=gamma)
+    return _native.coupled_weights(locals())
 
 
 def schedule(
@@ -169,7 +169,7 @@ def schedule(
     >>> weights.schedule([(0, 1.0), (2, 30.0)], 4).tolist()
     [1.0, 1.0, 30.0, 30.0]
     """
-    return _native.schedule(**locals())
+    return _native.schedule(locals())
 
 
 def formation(
@@ -238,7 +238,7 @@ def formation(
     >>> weights.formation(2, 1, 3, tracking=0.75)[0].tolist()
     [[1.0, -0.25], [-0.25, 1.0]]
     """
-    return _native.formation_weights(**locals())
+    return _native.formation_weights(locals())
 
 
 def formation_errors(
@@ -282,7 +282,7 @@ def formation_errors(
     >>> weights.formation_errors([[1.0, 2.0, 4.0, 6.0]], 2).tolist()
     [[3.0, 4.0]]
     """
-    return _native.formation_errors(e=e, n_agents=n_agents, pairs=pairs, axes=axes)
+    return _native.formation_errors(locals())
 
 
 def high_pass(order: int, cutoff_hz: float, dt_s: float, n_channels: int = 1) -> StateSpace:
@@ -321,7 +321,7 @@ def high_pass(order: int, cutoff_hz: float, dt_s: float, n_channels: int = 1) ->
     >>> np.abs(high.frequency_response(w)).reshape(-1).round(3).tolist()
     [0.01, 0.707, 1.0]
     """
-    return _native.band_filter(passes="high", **locals())
+    return _native.band_filter({"passes": "high", **locals()})
 
 
 def low_pass(order: int, cutoff_hz: float, dt_s: float, n_channels: int = 1) -> StateSpace:
@@ -356,4 +356,4 @@ def low_pass(order: int, cutoff_hz: float, dt_s: float, n_channels: int = 1) -> 
     >>> weights.low_pass(3, 40.0, 0.002, n_channels=2)
     StateSpace(n_states=8, n_inputs=2, n_outputs=2, dt_s=0.002)
     """
-    return _native.band_filter(passes="low", **locals())
+    return _native.band_filter({"passes": "low", **locals()})

@@ -4,6 +4,7 @@
 //! clock. In process, a [`machine::Machine`] is the far side of a bus in memory; as a separate
 //! process, the binary `ilc-sim` puts it on any bus. `ilc-rt` never imports this crate.
 
+pub mod bus;
 pub mod eds;
 pub mod event;
 pub mod machine;

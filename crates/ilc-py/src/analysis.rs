@@ -5,7 +5,7 @@
 
 use std::ffi::CString;
 
-use ilc_rt::learning::analysis::{self, Analysis, Method, Question, Uncertainty};
+use ilc_rt::learning::analysis::{self, Analysis, Question, Uncertainty};
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
 use ilc_rt::learning::tune::{Knowledge, TuningStep, tune as propose};
 use ilc_rt::learning::{self, Law};
@@ -15,20 +15,18 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answer::{ByName, by_name, give_signal, give_vector};
-use crate::argument::{Signal, misfit, read_array, read_vector};
-use crate::arguments::{Arguments, Keywords};
-use crate::detached::interruptible;
+use crate::argument::{Channels, Signal, misfit, read_array, read_vector};
+use crate::arguments::Arguments;
+use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::laws;
-use crate::python_law::Channels;
-use crate::whole::number;
+use crate::whole::{number, whole};
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn analyze<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn analyze<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let model = a.model("model")?;
     let law = a.get("law")?;
-    let given = a.maybe_whole("n_samples")?;
+    let given = a.maybe("n_samples", whole)?;
     let reference = read_reference(a, &model, given)?;
     let known = given.map_or_else(|| laws::samples_of(&law), |given| Ok(Some(given)))?;
     let of_reference = reference.as_ref().map(|signal| signal.n_samples);
@@ -50,9 +48,8 @@ pub(crate) fn analyze<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
         n_runs: a.whole("n_runs")?,
     };
     let mut law = read_law(&law, &model, n_samples)?;
-    let found =
-        interruptible(a.py(), || analysis::analyze(law.as_mut(), &model, n_samples, &question))?;
-    figures(a.py(), &found.or_raise()?, &model)
+    let found = computed(a.py(), || analysis::analyze(law.as_mut(), &model, n_samples, &question))?;
+    figures(a.py(), &found, &model)
 }
 
 /// Returns the figures of an analysis by the names of `ilc_rt.Analysis`.
@@ -62,17 +59,13 @@ fn figures<'py>(py: Python<'py>, found: &Analysis, model: &StateSpace) -> ByName
         let values = values.clone();
         values.map(|values| give_signal(py, values, n_channels, false)).transpose()
     };
-    let method = match found.method {
-        Method::Dense => "dense",
-        Method::Structured => "structured",
-    };
     let (factor, condition) = (found.monotonic_factor, found.pd_condition.as_ref());
     Ok(by_name!(py,
         [found => n_samples, converges, monotonic, why, transient_growth]
         [found => critical_frequency_hz, learnable_frequency_hz]
         [found => robust_factor, robust_lifted, uncertainty_allowed]
         [found => initial_error_rms, converged_error_rms, expected_rms_limit]
-        method: method,
+        method: found.method.name(),
         spectral_radius: found.spectral_radius.value,
         spectral_radius_error: found.spectral_radius.error,
         monotonic_factor: factor.map(|factor| factor.value),
@@ -87,26 +80,21 @@ fn figures<'py>(py: Python<'py>, found: &Analysis, model: &StateSpace) -> ByName
     ))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn refuse_divergent(keywords: Option<Keywords<'_, '_>>) -> PyResult<()> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn refuse_divergent(a: Arguments<'_, '_>) -> PyResult<()> {
     let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
     let law = a.get("law")?;
     if laws::is_python(&law)? {
         return Ok(());
     }
-    let mut law = laws::apart("law", &law, n_samples, channels(&model), 0)?;
-    let found = interruptible(a.py(), || {
+    let mut law = laws::apart("law", &law, n_samples, Channels::of(&model), 0)?;
+    let found = computed(a.py(), || {
         analysis::refuse_divergent(law.as_mut(), &model, n_samples)?;
         analysis::overreach(law.as_mut(), &model, n_samples)
     })?;
-    let Some(found) = found.or_raise()? else { return Ok(()) };
+    let Some(found) = found else { return Ok(()) };
     let message = CString::new(found.to_string())?;
     PyErr::warn(a.py(), &a.py().get_type::<PyUserWarning>(), &message, 2)
-}
-
-fn channels(model: &StateSpace) -> Channels {
-    Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
 }
 
 /// Reads a number or a list of gains.
@@ -127,10 +115,8 @@ fn read_reference(
 ) -> PyResult<Option<Signal>> {
     a.maybe("reference", |name, given| {
         let signal = Signal::read(name, given)?.with_channels(name, model.n_outputs())?;
-        match n_samples {
-            Some(n_samples) => signal.with_samples(name, n_samples),
-            None => Ok(signal),
-        }
+        let n_samples = n_samples.unwrap_or(signal.n_samples);
+        signal.with_samples(name, n_samples)
     })
 }
 
@@ -165,12 +151,11 @@ fn read_law(
             object.repr()?
         )));
     }
-    laws::apart("law", object, n_samples, channels(model), 0)
+    laws::apart("law", object, n_samples, Channels::of(model), 0)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn tune<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn tune<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
     let knowledge = Knowledge {
         uncertainty: read_uncertainty(a)?,
@@ -178,7 +163,7 @@ pub(crate) fn tune<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
         reference: read_reference(a, &model, Some(n_samples))?.map(|found| found.values),
         n_runs: a.whole("n_runs")?,
     };
-    let found = interruptible(a.py(), || propose(&model, n_samples, &knowledge))?.or_raise()?;
+    let found = computed(a.py(), || propose(&model, n_samples, &knowledge))?;
     let analysis = figures(a.py(), &found.analysis, &model)?;
     let step = |step: &TuningStep| -> ByName<'py> {
         let value = Some(step.value).filter(|value| value.is_finite());
@@ -201,9 +186,7 @@ pub(crate) fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> ByName<'py> {
         }
     };
     let is_flat = shape.len() == 2;
-    let found =
-        interruptible(py, || learning::repeatability(&values, count, n_samples, n_channels))?
-            .or_raise()?;
+    let found = computed(py, || learning::repeatability(&values, count, n_samples, n_channels))?;
     Ok(by_name!(py,
         [found => mean_rms, spread_rms, ratio, learnable, least_rms, largest_rms]
         mean: give_signal(py, found.mean, n_channels, is_flat)?,

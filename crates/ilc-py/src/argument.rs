@@ -2,12 +2,27 @@
 
 use std::ops::Deref;
 
+use ilc_rt::model::StateSpace;
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// The matrix type of `ilc-rt`.
 pub(crate) type Matrix = nalgebra::DMatrix<f64>;
+
+/// Channels of the input and of the output or error, of a model or a law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Channels {
+    pub(crate) n_inputs: usize,
+    pub(crate) n_outputs: usize,
+}
+
+impl Channels {
+    /// Returns the channels of a model.
+    pub(crate) fn of(model: &StateSpace) -> Self {
+        Self { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
+    }
+}
 
 /// Samples and channels of a signal, and true if it has a channel axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,19 +48,13 @@ impl Layout {
 
     /// Refuses any other number of samples.
     pub(crate) fn require_samples(self, name: &str, n_samples: usize) -> PyResult<()> {
-        if self.n_samples == n_samples {
-            return Ok(());
-        }
-        let rule = format!("({n_samples},) or ({n_samples}, n_channels)");
-        Err(misfit(name, &self.shape(), &rule))
+        let rule = || format!("({n_samples},) or ({n_samples}, n_channels)");
+        self.require(name, self.n_samples == n_samples, rule)
     }
 
     /// Refuses any other number of channels.
     pub(crate) fn require_channels(self, name: &str, n_channels: usize) -> PyResult<()> {
-        if self.n_channels == n_channels {
-            return Ok(());
-        }
-        Err(misfit(name, &self.shape(), &format!("(n_samples, {n_channels})")))
+        self.require(name, self.n_channels == n_channels, || format!("(n_samples, {n_channels})"))
     }
 
     /// Refuses any other size.
@@ -55,10 +64,12 @@ impl Layout {
         n_samples: usize,
         n_channels: usize,
     ) -> PyResult<()> {
-        if (self.n_samples, self.n_channels) == (n_samples, n_channels) {
-            return Ok(());
-        }
-        Err(misfit(name, &self.shape(), &format!("({n_samples}, {n_channels})")))
+        let fits = (self.n_samples, self.n_channels) == (n_samples, n_channels);
+        self.require(name, fits, || format!("({n_samples}, {n_channels})"))
+    }
+
+    fn require(self, name: &str, fits: bool, rule: impl FnOnce() -> String) -> PyResult<()> {
+        if fits { Ok(()) } else { Err(misfit(name, &self.shape(), &rule())) }
     }
 
     /// Returns the original shape.

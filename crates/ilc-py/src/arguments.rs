@@ -1,4 +1,4 @@
-//! Keyword arguments, as passed on by the typed functions and classes of Python.
+//! Arguments by name, as passed on in a dict by the typed functions and classes of Python.
 //!
 //! For every family of this crate: each argument is read, and refused, under its own name.
 //! Signatures, defaults and documentation are those of the Python package.
@@ -8,27 +8,28 @@ use ilc_rt::model::StateSpace;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
+use pyo3::{Borrowed, CastError};
 
 use crate::argument::{Matrix, Signal, misfit, read_array, read_pair, read_vector};
 use crate::model_argument::read_model;
-use crate::whole::{each, number, pair, refused, shown, whole};
+use crate::whole::{each, finite, number, pair, positive, refused, shown, whole};
 
-/// The keywords of a call from Python.
-pub(crate) type Keywords<'a, 'py> = &'a Bound<'py, PyDict>;
-
-/// The keyword arguments of one call.
+/// The arguments of one call by name, handed over in a dict.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Arguments<'a, 'py>(Keywords<'a, 'py>);
+pub(crate) struct Arguments<'a, 'py>(Borrowed<'a, 'py, PyDict>);
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Arguments<'a, 'py> {
+    type Error = CastError<'a, 'py>;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> Result<Self, Self::Error> {
+        object.cast().map(Self)
+    }
+}
 
 impl<'a, 'py> Arguments<'a, 'py> {
-    /// Wraps the keywords of a call.
-    pub(crate) fn new(keywords: &'a Bound<'py, PyDict>) -> Self {
-        Self(keywords)
-    }
-
-    /// Wraps the keywords of a function that requires some.
-    pub(crate) fn of(keywords: Option<&'a Bound<'py, PyDict>>) -> PyResult<Self> {
-        keywords.map(Self).ok_or_else(|| PyTypeError::new_err("keyword arguments are needed"))
+    /// Wraps the arguments of a call.
+    pub(crate) fn new(arguments: &'a Bound<'py, PyDict>) -> Self {
+        Self(arguments.as_borrowed())
     }
 
     /// Returns the interpreter.
@@ -67,14 +68,24 @@ impl<'a, 'py> Arguments<'a, 'py> {
         self.maybe(name, number)
     }
 
+    /// Reads a finite number.
+    pub(crate) fn finite(self, name: &str) -> PyResult<f64> {
+        finite(name, self.number(name)?)
+    }
+
+    /// Reads a finite number above 0.
+    pub(crate) fn positive(self, name: &str) -> PyResult<f64> {
+        positive(name, self.number(name)?)
+    }
+
+    /// Reads a limit above 0; `None` is infinite.
+    pub(crate) fn limit(self, name: &str) -> PyResult<f64> {
+        self.maybe_number(name)?.map_or(Ok(f64::INFINITY), |value| positive(name, value))
+    }
+
     /// Reads a whole number.
     pub(crate) fn whole(self, name: &str) -> PyResult<usize> {
         whole(name, &self.get(name)?)
-    }
-
-    /// Reads a whole number, or `None`.
-    pub(crate) fn maybe_whole(self, name: &str) -> PyResult<Option<usize>> {
-        self.maybe(name, whole)
     }
 
     /// Reads indices from 0, or `None`.
@@ -113,7 +124,16 @@ impl<'a, 'py> Arguments<'a, 'py> {
 
     /// Reads one of several words, each with its meaning.
     pub(crate) fn choice<T: Copy>(self, name: &str, choices: &[(&str, T)]) -> PyResult<T> {
-        chosen(name, &self.get(name)?, choices)
+        let word = self.get(name)?;
+        let text = word.cast::<PyString>().map_err(|_| refused(name, &word, "a text"))?.to_str()?;
+        if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
+            return Ok(*meaning);
+        }
+        let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
+        let words = words.join(", ");
+        let (others, last) = words.rsplit_once(", ").unwrap_or(("", &words));
+        let line = format!("{name} = {}; {others} or {last} is needed", shown(&word));
+        Err(PyValueError::new_err(line))
     }
 
     /// Reads a time-invariant model.
@@ -160,7 +180,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
     /// Returns a copy that nothing changes later: lists and arrays are copied, NumPy's numbers are Python's.
     pub(crate) fn kept(self) -> PyResult<Bound<'py, PyDict>> {
         let kept = PyDict::new(self.py());
-        for (name, value) in self.0 {
+        for (name, value) in self.0.iter() {
             let shape = value.getattr_opt("shape")?;
             let value = if shape.is_some_and(|shape| shape.len().is_ok_and(|axes| axes == 0)) {
                 value.call_method0("item")?
@@ -177,7 +197,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
     /// Returns the call in Python's notation, with arrays by their shapes.
     pub(crate) fn call(self, name: &str) -> PyResult<String> {
         let mut words = Vec::new();
-        for (key, value) in self.0 {
+        for (key, value) in self.0.iter() {
             let text = match value.getattr_opt("shape")? {
                 Some(shape) if shape.len().is_ok_and(|axes| axes > 0) => {
                     format!("array of shape {}", shape.repr()?)
@@ -190,20 +210,12 @@ impl<'a, 'py> Arguments<'a, 'py> {
     }
 }
 
-/// Reads one of several words, each with its meaning.
-pub(crate) fn chosen<T: Copy>(
-    name: &str,
-    word: &Bound<'_, PyAny>,
-    choices: &[(&str, T)],
-) -> PyResult<T> {
-    let text = word.cast::<PyString>().map_err(|_| refused(name, word, "a text"))?.to_str()?;
-    if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
-        return Ok(*meaning);
-    }
-    let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
-    let (last, others) = words
-        .split_last()
-        .map_or((String::new(), &words[..]), |(last, others)| (last.clone(), others));
-    let (text, others) = (shown(word), others.join(", "));
-    Err(PyValueError::new_err(format!("{name} = {text}; {others} or {last} is needed")))
+/// Reads a struct: its fields by their names, each with a reader of [`Arguments`], then others with their values.
+///
+/// `read!(a, PdGains: [number => kp, kd] [whole => lead_samples])`
+macro_rules! read {
+    ($a:expr, $of:ident: $([$reader:ident => $($field:ident),+ $(,)?])* $($name:ident: $value:expr),* $(,)?) => {
+        $of { $($($field: $a.$reader(stringify!($field))?,)+)* $($name: $value,)* }
+    };
 }
+pub(crate) use read;

@@ -8,23 +8,18 @@ use std::time::Duration;
 
 use ilc_rt::campaign::{self, CampaignError, Disturbance, Options};
 use ilc_rt::cli::{IdentifyOptions, described, parse};
-use ilc_rt::config::Cell;
-use ilc_rt::fieldbus::Bus;
-use ilc_rt::fieldbus::transport::{self, GroupSide, in_process};
+use ilc_rt::fieldbus::transport;
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
-use ilc_sim::machine::{ClockMode, Machine};
 use pyo3::exceptions::{PyBaseException, PyValueError};
 use pyo3::prelude::*;
 
-use crate::argument::read_disturbance;
+use crate::argument::{Channels, read_disturbance};
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::python_law::{Channels, Frame, PythonLaw};
+use crate::python_law::{Frame, PythonLaw};
 
-/// Capacity of the in-process bus towards the loop, in frames.
-const LOOPBACK_FRAMES: usize = 1024;
 /// Capacity of events towards Python; a full queue makes the campaign wait.
 const EVENTS: usize = 64;
 /// Interval at which a waiting `next` checks for signals.
@@ -119,7 +114,6 @@ impl Drop for EventStream {
 /// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
 ///     something else cannot.
 #[pyfunction(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn run_events(
     cell: &Bound<'_, PyCell>,
     arguments: Vec<String>,
@@ -155,7 +149,7 @@ pub(crate) fn run_events(
     let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
         let mut cell = cell;
         cell.bus.address = address;
-        let bus = open(&cell)?;
+        let bus = ilc_sim::bus::open(&cell)?;
         let mut send = |event: &Event| {
             if let Ok(text) = serde_json::to_string(event) {
                 let _ = sender.send(text);
@@ -187,7 +181,7 @@ impl Work {
         let parsed = match verb {
             "run" => parse(arguments).map(Self::Run),
             "identify" => parse(arguments).map(Self::Identify),
-            _ => Err(format!("verb = '{verb}': 'run' or 'identify' is allowed")),
+            _ => Err(no_verb(verb)),
         };
         parsed.map_err(PyValueError::new_err)
     }
@@ -197,7 +191,6 @@ impl Work {
 ///
 /// Raises ValueError with the name of the option, its value and the allowed values.
 #[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)
 }
@@ -210,12 +203,13 @@ pub(crate) fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {
         "run" => described::<Options>(),
         "identify" => described::<IdentifyOptions>(),
-        _ => {
-            let line = format!("verb = '{verb}': 'run' or 'identify' is allowed");
-            return Err(PyValueError::new_err(line));
-        }
+        _ => return Err(PyValueError::new_err(no_verb(verb))),
     };
     serde_json::to_string(&options).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+fn no_verb(verb: &str) -> String {
+    format!("verb = '{verb}': 'run' or 'identify' is allowed")
 }
 
 /// Returns a source of disturbances that calls a Python function.
@@ -227,18 +221,4 @@ fn measured(ask: Py<PyAny>) -> Disturbance {
         })
         .map_err(|error: PyErr| error.to_string().replace('\n', " "))
     })
-}
-
-fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
-    let file = cell.file.display().to_string();
-    if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
-        return campaign::open_buses(cell, GroupSide::Controller)
-            .map_err(|(place, source)| CampaignError::Bus { place, source });
-    }
-    match Machine::from_cell(cell, ClockMode::LockStep) {
-        Ok(machine) => {
-            Ok(in_process(&cell.bus.address, machine, cell.cell.cycle_us, LOOPBACK_FRAMES))
-        }
-        Err(error) => Err(CampaignError::Simulation { file, reason: error.to_string() }),
-    }
 }

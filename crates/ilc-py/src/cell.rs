@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, Cell, Measure, mode};
+use ilc_rt::config::{Axis, Cell, mode};
 use ilc_rt::design::{self, Plan};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -93,7 +93,6 @@ impl PyCell {
     /// Returns Cell. Raises ValueError in one line: file, key, value and the allowed values.
     #[staticmethod]
     #[pyo3(signature = (path, allow_divergent=false))]
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn load(
         py: Python<'_>,
         path: std::path::PathBuf,
@@ -113,7 +112,6 @@ impl PyCell {
     ///
     /// A diverging law is accepted.
     #[staticmethod]
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn _check(text: &str, path: std::path::PathBuf) -> PyResult<()> {
         let mut cell = Cell::parse(text, &path.display().to_string()).or_raise()?;
         cell.learning.allow_divergent = true;
@@ -191,6 +189,8 @@ impl PyCell {
             let input = axis.input_kind();
             (mode::bound_key(input), mode::bound_of(input, &cell.learning))
         };
+        let natural_hz = |axis: &Axis| mode::of(axis.interface).natural_frequency_hz(axis);
+        let gain_per_s = |axis: &Axis| axis.position_loop.map(|of_axis| of_axis.gain_per_s);
         Self {
             n_samples: plan.n_samples(),
             reference_m: plan.reference_m,
@@ -203,18 +203,11 @@ impl PyCell {
             inputs: each(&cell, |axis| axis.input_kind().name()),
             input_bounds: each(&cell, bound),
             input_scales: each(&cell, mode::scale_of),
-            natural_frequencies_hz: each(&cell, |axis| {
-                mode::of(axis.interface).natural_frequency_hz(axis)
-            }),
+            natural_frequencies_hz: each(&cell, natural_hz),
             axis_units: each(&cell, |axis| axis.unit.symbol()),
-            position_gains_per_s: each(&cell, |axis| {
-                axis.position_loop.map(|position_loop| position_loop.gain_per_s)
-            }),
+            position_gains_per_s: each(&cell, gain_per_s),
             bus: cell.bus.address.clone(),
-            measure: match cell.learning.measure {
-                Measure::Encoder => "encoder",
-                Measure::Tcp => "tcp",
-            },
+            measure: cell.learning.measure.name(),
             law: cell.learning.law.as_str(),
             warnings,
             cell,

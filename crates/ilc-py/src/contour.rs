@@ -1,6 +1,6 @@
 //! Contour geometry: `contour_error`, `coupling_gains`, `projection_across`, `Line`, `Arc`.
 
-use ilc_rt::trajectory::contour::{Arc, ContourError, Line, SampledPath, Shape, coupling};
+use ilc_rt::trajectory::contour::{Arc, Line, SampledPath, Shape, coupling};
 use ilc_rt::trajectory::{MAX_AXES, contour_error_m};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -8,7 +8,7 @@ use pyo3::types::PyList;
 
 use crate::answer::{Array, give_matrices, give_signal, give_vector};
 use crate::argument::{Signal, misfit, read_vector};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::made::{Made, New, made};
@@ -21,9 +21,7 @@ pub(crate) struct PyLine(Line);
 #[pymethods]
 impl PyLine {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let point = |name: &str| read_point(name, &a.get(name)?);
         made(a, Self(Line { from_m: point("from_m")?, to_m: point("to_m")? }))
     }
@@ -36,9 +34,7 @@ pub(crate) struct PyArc(Arc);
 #[pymethods]
 impl PyArc {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let point = |name: &str| read_point(name, &a.get(name)?);
         let axis = a.maybe("axis", read_point)?.unwrap_or([0.0, 0.0, 1.0]);
         let arc = Arc::new(point("from_m")?, point("centre_m")?, axis, a.number("sweep_rad")?);
@@ -46,35 +42,32 @@ impl PyArc {
     }
 }
 
-#[pyfunction(signature = (reference_m, actual_m, window=None))]
-pub(crate) fn contour_error<'py>(
-    reference_m: &Bound<'py, PyAny>,
-    actual_m: &Bound<'py, PyAny>,
-    window: Option<&Bound<'py, PyAny>>,
-) -> Array<'py> {
-    let py = reference_m.py();
-    let window = window.map(|window| whole("window", window)).transpose()?;
-    if let Some(shapes) = read_shapes(reference_m, window)? {
-        let points = read_points("actual_m", actual_m)?;
+#[pyfunction]
+pub(crate) fn contour_error<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
+    let (py, path, actual_m) = (a.py(), a.get("reference_m")?, a.get("actual_m")?);
+    let window = a.maybe("window", whole)?;
+    if let Some(shapes) = read_shapes(&path, window)? {
+        let points = read_points("actual_m", &actual_m)?;
         let errors = detached(py, || Shape::contour_error_m(&shapes, &points));
         return Ok(give_vector(py, errors));
     }
-    let reference = read_path("reference_m", reference_m)?;
-    let n_axes = reference.n_channels;
-    let actual = read_path("actual_m", actual_m)?.with_channels("actual_m", n_axes)?;
-    let errors = match (window, n_axes) {
-        (Some(window), 1..=MAX_AXES) => {
-            detached(py, || contour_error_m(&reference.values, &actual.values, n_axes, window))
-        }
-        (None, 2) => to_sampled::<2>(py, &reference, &actual)?,
-        (None, 3) => to_sampled::<3>(py, &reference, &actual)?,
-        (None, _) => {
-            let allowed = "2 or 3 axes, or 1 to 12 with a window,";
-            return Err(misfit("reference_m", &reference.shape(), allowed));
-        }
-        (Some(_), _) => return Err(misfit("reference_m", &reference.shape(), "1 to 12 axes")),
+    let Signal { values: reference, layout } = read_path("reference_m", &path)?;
+    let n_axes = layout.n_channels;
+    let actual = read_path("actual_m", &actual_m)?.with_channels("actual_m", n_axes)?.values;
+    let allowed = match window {
+        None if !matches!(n_axes, 2 | 3) => "2 or 3 axes, or 1 to 12 with a window,",
+        Some(_) if n_axes > MAX_AXES => "1 to 12 axes",
+        _ => "",
     };
-    Ok(give_vector(py, errors))
+    if !allowed.is_empty() {
+        return Err(misfit("reference_m", &layout.shape(), allowed));
+    }
+    let errors = detached(py, || match window {
+        Some(window) => Ok(contour_error_m(&reference, &actual, n_axes, window)),
+        None if n_axes == 2 => SampledPath::<2>::contour_error_m(&reference, &actual),
+        None => SampledPath::<3>::contour_error_m(&reference, &actual),
+    });
+    Ok(give_vector(py, errors.or_raise()?))
 }
 
 #[pyfunction]
@@ -97,20 +90,6 @@ pub(crate) fn projection_across<'py>(reference_m: &Bound<'py, PyAny>) -> Array<'
     let n = reference.n_channels;
     let at = |k: usize, row, col| flat[(k * n + row) * n + col];
     Ok(give_matrices(reference_m.py(), (reference.n_samples, n, n), at))
-}
-
-fn to_sampled<const N: usize>(
-    py: Python<'_>,
-    reference: &Signal,
-    actual: &Signal,
-) -> PyResult<Vec<f64>> {
-    detached(py, || {
-        let path = SampledPath::<N>::new(reference.values.as_chunks().0)?;
-        let points = actual.values.as_chunks().0.iter();
-        let distance = |p| path.nearest(p).map_or(f64::NAN, |found| found.distance_m);
-        Ok::<Vec<f64>, ContourError>(points.map(distance).collect())
-    })
-    .or_raise()
 }
 
 /// Reads a path, always with a channel axis.
@@ -143,16 +122,13 @@ fn read_point(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
 /// Reads a list of shapes; `None` for anything else.
 fn read_shapes(object: &Bound<'_, PyAny>, window: Option<usize>) -> PyResult<Option<Vec<Shape>>> {
     let Ok(list) = object.cast::<PyList>() else { return Ok(None) };
-    let mut shapes = Vec::with_capacity(list.len());
-    for item in list {
-        if let Ok(line) = item.cast::<PyLine>() {
-            shapes.push(Shape::Line(line.get().0));
-        } else if let Ok(arc) = item.cast::<PyArc>() {
-            shapes.push(Shape::Arc(arc.get().0));
-        } else {
-            return Ok(None);
-        }
-    }
+    let shape = |item: Bound<'_, PyAny>| {
+        let line = item.cast::<PyLine>().map(|line| Shape::Line(line.get().0));
+        line.or_else(|_| item.cast::<PyArc>().map(|arc| Shape::Arc(arc.get().0))).ok()
+    };
+    let Some(shapes) = list.iter().map(shape).collect::<Option<Vec<Shape>>>() else {
+        return Ok(None);
+    };
     if shapes.is_empty() {
         return Err(PyValueError::new_err("reference_m is an empty list; a path is needed"));
     }

@@ -6,17 +6,16 @@ use ilc_rt::control::{
     PidMatrices, variable_gains,
 };
 use ilc_rt::model::StateSpace;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::answer::{Array, give_signal, give_vector};
 use crate::argument::{Matrix, Signal, read_pair};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::{Arguments, read};
 use crate::error::OrRaise;
 use crate::guard::Guarded;
 use crate::made::{Made, New, made};
 use crate::model::PyStateSpace;
-use crate::whole::{Real, number};
+use crate::whole::{Real, finite, number};
 
 #[pyclass(name = "Pid", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
@@ -28,23 +27,18 @@ pub(crate) struct PyPid {
 #[pymethods]
 impl PyPid {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
-        let dt_s = positive("dt_s", a.number("dt_s")?)?;
-        let filter_s = positive("filter_s", a.number("filter_s")?)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
+        let (dt_s, time_constant_s) = (a.positive("dt_s")?, a.positive("filter_s")?);
         let derivatives = [
             ("difference", Derivative::Difference),
             ("delayed", Derivative::DelayedDifference),
-            ("filtered", Derivative::Filtered { time_constant_s: filter_s }),
+            ("filtered", Derivative::Filtered { time_constant_s }),
         ];
-        let gains = PidGains {
-            kp: finite("kp", a.number("kp")?)?,
-            ki_per_s: finite("ki_per_s", a.number("ki_per_s")?)?,
-            kd_s: finite("kd_s", a.number("kd_s")?)?,
+        let gains = read!(a, PidGains:
+            [finite => kp, ki_per_s, kd_s]
+            [limit => output_max]
             derivative: a.choice("derivative", &derivatives)?,
-            output_max: limit(a, "output_max")?,
-        };
+        );
         made(a, Self { dt_s, pid: Guarded::new(Pid::new(gains, dt_s)) })
     }
 
@@ -96,21 +90,13 @@ pub(crate) struct PyCascade(Guarded<Cascade>);
 #[pymethods]
 impl PyCascade {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
-        let plain = |name| finite(name, a.number(name)?);
-        let gains = CascadeGains {
-            position_gain_per_s: plain("position_gain_per_s")?,
-            velocity_gain_n_s_m: plain("velocity_gain_n_s_m")?,
-            integral_time_s: limit(a, "integral_time_s")?,
-            velocity_feedforward: plain("velocity_feedforward")?,
-            acceleration_feedforward_kg: plain("acceleration_feedforward_kg")?,
-            velocity_max_m_s: limit(a, "velocity_max_m_s")?,
-            force_max_n: limit(a, "force_max_n")?,
-        };
-        let dt_s = positive("dt_s", a.number("dt_s")?)?;
-        made(a, Self(Guarded::new(Cascade::new(gains, dt_s))))
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
+        let gains = read!(a, CascadeGains:
+            [finite => position_gain_per_s, velocity_gain_n_s_m]
+            [finite => velocity_feedforward, acceleration_feedforward_kg]
+            [limit => integral_time_s, velocity_max_m_s, force_max_n]
+        );
+        made(a, Self(Guarded::new(Cascade::new(gains, a.positive("dt_s")?))))
     }
 
     /// Return the force of this tick in N, saturated.
@@ -154,9 +140,7 @@ pub(crate) struct PyCrossCoupled(Guarded<CrossCoupled>);
 #[pymethods]
 impl PyCrossCoupled {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let controller = a.get("controller")?;
         let mut pid = *controller.cast::<PyPid>()?.get().pid.borrow(a.py())?;
         pid.reset();
@@ -193,23 +177,4 @@ impl PyCrossCoupled {
 
 fn give(name: &str, value: f64, output: Bounded) -> PyResult<f64> {
     if output.finite { Ok(output.value) } else { finite(name, value).map(|_| output.value) }
-}
-
-fn finite(name: &str, value: f64) -> PyResult<f64> {
-    if value.is_finite() {
-        return Ok(value);
-    }
-    Err(PyValueError::new_err(format!("{name} = {value}; only finite numbers are allowed")))
-}
-
-fn positive(name: &str, value: f64) -> PyResult<f64> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(value);
-    }
-    Err(PyValueError::new_err(format!("{name} = {value}; it must be finite and above 0")))
-}
-
-/// Reads a limit; `None` is infinite.
-fn limit(a: Arguments<'_, '_>, name: &str) -> PyResult<f64> {
-    a.maybe_number(name)?.map_or(Ok(f64::INFINITY), |value| positive(name, value))
 }

@@ -7,10 +7,23 @@ use ilc_rt::interrupt;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
+use crate::error::{OrRaise, Raised};
+
 /// Runs `work` while other Python threads run: for everything that may take more than 100 us. It is not
 /// interrupted, as it may change what others keep.
 pub(crate) fn detached<T: Send, F: Send + FnOnce() -> T>(py: Python<'_>, work: F) -> T {
     py.detach(|| interrupt::shielded(work))
+}
+
+/// Runs `work` as [`interruptible`] does, and raises its error.
+pub(crate) fn computed<T: Send, E: Send>(
+    py: Python<'_>,
+    work: impl Send + FnOnce() -> Result<T, E>,
+) -> PyResult<T>
+where
+    Raised: From<E>,
+{
+    interruptible(py, work)?.or_raise()
 }
 
 /// Runs `work` as [`detached`] does, until a signal handler raises: for work that may take seconds, and that owns

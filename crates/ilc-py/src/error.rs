@@ -16,12 +16,25 @@ pub(crate) trait OrRaise<T> {
     fn or_raise(self) -> PyResult<T>;
 }
 
+impl<T, E> OrRaise<T> for Result<T, E>
+where
+    Raised: From<E>,
+{
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| Raised::from(error).0)
+    }
+}
+
+/// The exception of an error.
+#[derive(Debug)]
+pub(crate) struct Raised(pub(crate) PyErr);
+
 /// Maps the errors of a module to an exception.
 macro_rules! raise {
     ($($error:ty => $exception:ty),* $(,)?) => {
-        $(impl<T> OrRaise<T> for Result<T, $error> {
-            fn or_raise(self) -> PyResult<T> {
-                self.map_err(|error| <$exception>::new_err(error.to_string()))
+        $(impl From<$error> for Raised {
+            fn from(error: $error) -> Self {
+                Self(<$exception>::new_err(error.to_string()))
             }
         })*
     };
@@ -31,8 +44,10 @@ raise! {
     model::ModelError => exceptions::ModelError,
     signal::SignalError => exceptions::SignalError,
     trajectory::TrajectoryError => exceptions::TrajectoryError,
+    trajectory::program::GcodeError => exceptions::TrajectoryError,
     kinematics::KinematicsError => exceptions::KinematicsError,
     contour::ContourError => exceptions::ContourError,
+    model::identify::ResponseError => PyValueError,
     library::LibraryError => PyOSError,
     library::ElsewhereError => PyValueError,
     learning::batch::BatchError => exceptions::LearningError,
@@ -41,21 +56,21 @@ raise! {
     campaign::CampaignError => PyValueError,
 }
 
-impl<T> OrRaise<T> for Result<T, learning::LearningError> {
-    fn or_raise(self) -> PyResult<T> {
+impl From<learning::LearningError> for Raised {
+    fn from(error: learning::LearningError) -> Self {
         use learning::LearningError::{Model, Signal};
-        self.or_else(|error| match error {
-            Model(error) => Err(error).or_raise(),
-            Signal(error) => Err(error).or_raise(),
-            error => Err(exceptions::LearningError::new_err(error.to_string())),
-        })
+        match error {
+            Model(error) => error.into(),
+            Signal(error) => error.into(),
+            error => Self(exceptions::LearningError::new_err(error.to_string())),
+        }
     }
 }
 
-impl<T> OrRaise<T> for Result<T, identification::IdentificationError> {
-    fn or_raise(self) -> PyResult<T> {
+impl From<identification::IdentificationError> for Raised {
+    fn from(error: identification::IdentificationError) -> Self {
         use identification::IdentificationError::Model;
-        self.map_err(|error| match error {
+        Self(match error {
             Model { .. } => exceptions::ModelError::new_err(error.to_string()),
             error => PyValueError::new_err(error.to_string()),
         })

@@ -3,41 +3,19 @@
 
 use ilc_rt::cli::parse;
 use ilc_rt::identification::{
-    self, Described, Experiment, ExperimentOptions, Form, IdentificationError, Identified, Signals,
-    waveform_name,
+    self, Described, Experiment, ExperimentOptions, Form, Identified, Signals, waveform_name,
 };
-use ilc_rt::model::identify::{Doubt, Waveform};
+use ilc_rt::model::identify::Doubt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::answer::{ByName, by_name, give_vector};
 use crate::argument::read_vector;
+use crate::arguments::Arguments;
 use crate::cell::PyCell;
-use crate::detached::interruptible;
-use crate::error::OrRaise;
+use crate::detached::computed;
+use crate::error::{OrRaise, Raised};
 use crate::identify::{give_measured, give_second_order, give_velocity_loop};
-use crate::whole::{Real, whole};
-
-/// Reads the name of a waveform.
-pub(crate) fn read_waveform(name: &str) -> PyResult<Waveform> {
-    identification::waveform(name).ok_or_else(|| {
-        PyValueError::new_err(format!(
-            "waveform = '{name}'; 'sweep', 'linear-sweep' or 'multisine' is needed"
-        ))
-    })
-}
-
-/// Failure of an identification: refused, or raised by the function that executes the experiments.
-enum Failure {
-    Refused(IdentificationError),
-    Raised(PyErr),
-}
-
-impl From<IdentificationError> for Failure {
-    fn from(error: IdentificationError) -> Self {
-        Self::Refused(error)
-    }
-}
 
 /// Identify an axis of a cell by experiments, in narrower bands until a model fits.
 ///
@@ -51,7 +29,6 @@ impl From<IdentificationError> for Failure {
 /// Raises ModelError if the response cannot be fitted.
 /// Raises ValueError if an option cannot be used, or an amplitude is beyond a limit.
 #[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn identify_axis<'py>(
     py: Python<'py>,
     cell: &Bound<'py, PyCell>,
@@ -71,7 +48,7 @@ pub(crate) fn identify_axis<'py>(
                 error_m: read_vector("error", &error_m)?,
             })
         };
-        execute().map(Some).map_err(Failure::Raised)
+        execute().map(Some).map_err(Raised)
     };
     let mut tell = |line: &str| {
         if let Err(error) = report.call1((line,)) {
@@ -82,13 +59,8 @@ pub(crate) fn identify_axis<'py>(
     if let Some(error) = raised {
         return Err(error);
     }
-    let found = match found {
-        Err(Failure::Raised(error)) => return Err(error),
-        Err(Failure::Refused(error)) => return Err(error).or_raise(),
-        Ok(found) => found,
-    };
     let (experiment, identified) =
-        found.ok_or_else(|| PyValueError::new_err("no experiment was completed"))?;
+        found.or_raise()?.ok_or_else(|| PyValueError::new_err("no experiment was completed"))?;
     let result = describe(py, identified)?;
     result.set_item("experiment", figures(py, &experiment)?)?;
     Ok(result)
@@ -96,7 +68,6 @@ pub(crate) fn identify_axis<'py>(
 
 /// Return the experiment of options, words of ``ilc-rt identify``, in the default band if they give none.
 #[pyfunction]
-#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 pub(crate) fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> ByName<'_> {
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
     let axis = options.axis.clone().unwrap_or_default();
@@ -108,20 +79,12 @@ pub(crate) fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> ByNam
 ///
 /// Returns signals, response, models, uncertainty and doubt by name.
 #[pyfunction]
-pub(crate) fn evaluate_experiment<'py>(
-    py: Python<'py>,
-    u: &Bound<'py, PyAny>,
-    y: &Bound<'py, PyAny>,
-    period_samples: &Bound<'py, PyAny>,
-    from_hz: Real,
-    to_hz: Real,
-    dt_s: Real,
-) -> ByName<'py> {
-    let (u, y) = (read_vector("u", u)?, read_vector("y", y)?);
-    let period_samples = whole("period_samples", period_samples)?;
-    let (band_hz, dt_s) = ((from_hz.0, to_hz.0), dt_s.0);
+pub(crate) fn evaluate_experiment<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
+    let (u, y, dt_s) = (a.vector("u")?, a.vector("y")?, a.number("dt_s")?);
+    let period_samples = a.whole("period_samples")?;
+    let band_hz = (a.number("from_hz")?, a.number("to_hz")?);
     let evaluate = || Identified::evaluate(u, y, period_samples, band_hz, dt_s, Form::Free);
-    describe(py, interruptible(py, evaluate)?.or_raise()?)
+    describe(a.py(), computed(a.py(), evaluate)?)
 }
 
 /// Returns the figures of an experiment, as the arguments of `ilc_rt.experiment.Experiment`.

@@ -2,6 +2,7 @@
 //!
 //! Each function returns its figures by name; the classes that hold them are those of `ilc_rt.fits`.
 
+use ilc_rt::identification::WAVEFORMS;
 use ilc_rt::model::identify::{
     self, Averaging, Excitation, FrequencyResponse, Known, SecondOrder, SecondOrderFit,
     VelocityLoop, VelocityLoopFit,
@@ -12,11 +13,11 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, ByName, by_name, give_vector};
 use crate::argument::read_vector;
-use crate::arguments::{Arguments, Keywords};
-use crate::detached::interruptible;
+use crate::arguments::{Arguments, read};
+use crate::detached::computed;
 use crate::error::OrRaise;
-use crate::experiment::read_waveform;
 use crate::model::PyStateSpace;
+use crate::whole::whole;
 
 /// Reads a measured response.
 fn read_measured(a: Arguments<'_, '_>) -> PyResult<FrequencyResponse> {
@@ -25,21 +26,7 @@ fn read_measured(a: Arguments<'_, '_>) -> PyResult<FrequencyResponse> {
     let response = read_complex("response", &a.get("response")?)?;
     let coherence = a.maybe("coherence", read_vector)?.unwrap_or_else(|| vec![1.0; n]);
     let n_averages = a.number("n_averages")?;
-    for (name, found) in [("response", response.len()), ("coherence", coherence.len())] {
-        if found != n {
-            let line =
-                format!("{name} has {found} entries; {n}, one for each frequency, are needed");
-            return Err(PyValueError::new_err(line));
-        }
-    }
-    if let Some(value) = coherence.iter().find(|value| !(0.0..=1.0).contains(*value)) {
-        return Err(PyValueError::new_err(format!("coherence holds {value}; allowed 0 to 1")));
-    }
-    if !(n_averages.is_finite() && n_averages >= 1.0) {
-        let line = format!("n_averages = {n_averages}; at least 1 is needed");
-        return Err(PyValueError::new_err(line));
-    }
-    Ok(FrequencyResponse { frequency_hz, response, coherence, n_averages })
+    FrequencyResponse { frequency_hz, response, coherence, n_averages }.checked().or_raise()
 }
 
 /// Returns a measured response by the names of `ilc_rt.fits.FrequencyResponse`.
@@ -52,46 +39,38 @@ pub(crate) fn give_measured(py: Python<'_>, measured: FrequencyResponse) -> ByNa
     ))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn check_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn check_response<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     give_measured(a.py(), read_measured(a)?)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn relative_deviation<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn relative_deviation<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     Ok(give_vector(a.py(), read_measured(a)?.relative_deviation()))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn frequency_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn frequency_response<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (u, y, dt_s) = (a.vector("u")?, a.vector("y")?, a.number("dt_s")?);
-    let overlap_samples = a.maybe_whole("overlap_samples")?;
-    let averaging = match (a.maybe_whole("period_samples")?, a.maybe_whole("segment_samples")?) {
+    let overlap_samples = a.maybe("overlap_samples", whole)?;
+    let averaging = match (a.maybe("period_samples", whole)?, a.maybe("segment_samples", whole)?) {
         (Some(_), Some(_)) => {
             let line = "period_samples and segment_samples exclude each other; give one of them";
             return Err(PyValueError::new_err(line));
         }
         (Some(period_samples), None) => Averaging::Periods { period_samples },
-        (None, segment_samples) => {
-            let segment_samples = segment_samples.unwrap_or(u.len() / 8);
-            let overlap_samples = overlap_samples.unwrap_or(segment_samples / 2);
-            Averaging::Welch { segment_samples, overlap_samples }
-        }
+        (None, segment_samples) => Averaging::welch(u.len(), segment_samples, overlap_samples),
     };
-    let found = interruptible(a.py(), || identify::frequency_response(&u, &y, dt_s, averaging))?;
-    give_measured(a.py(), found.or_raise()?)
+    let found = computed(a.py(), || identify::frequency_response(&u, &y, dt_s, averaging))?;
+    give_measured(a.py(), found)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn fit_second_order<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn fit_second_order<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
-    let known = Known { gain: a.maybe_number("gain")?, delay_s: a.maybe_number("delay_s")? };
-    let fit = interruptible(a.py(), || identify::fit_second_order(&measured, dt_s, known))?;
-    give_second_order(a.py(), &fit.or_raise()?)
+    let known = read!(a, Known: [maybe_number => gain, delay_s]);
+    let fit = computed(a.py(), || identify::fit_second_order(&measured, dt_s, known))?;
+    give_second_order(a.py(), &fit)
 }
 
 /// Returns a fit by the names of `ilc_rt.fits.SecondOrderFit`.
@@ -105,37 +84,32 @@ pub(crate) fn give_second_order<'py>(py: Python<'py>, fit: &SecondOrderFit) -> B
 }
 
 fn read_second_order(a: Arguments<'_, '_>) -> PyResult<SecondOrder> {
-    Ok(SecondOrder {
-        gain: a.number("gain")?,
-        natural_frequency_hz: a.number("natural_frequency_hz")?,
-        damping: a.number("damping")?,
-        delay_s: a.number("delay_s")?,
-        dt_s: a.maybe_number("dt_s")?,
-    })
+    Ok(read!(a, SecondOrder:
+        [number => gain, natural_frequency_hz, damping, delay_s]
+        [maybe_number => dt_s]
+    ))
 }
 
-#[pyfunction(signature = (frequency_hz, /, **model))]
+#[pyfunction]
 pub(crate) fn second_order_response<'py>(
     frequency_hz: &Bound<'py, PyAny>,
-    model: Option<Keywords<'_, 'py>>,
+    a: Arguments<'_, 'py>,
 ) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
-    let a = Arguments::of(model)?;
     Ok(give_vector(a.py(), read_second_order(a)?.response(&frequency_hz)))
 }
 
-#[pyfunction(signature = (**model))]
-pub(crate) fn second_order_model(model: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    read_second_order(Arguments::of(model)?)?.state_space().or_raise().map(PyStateSpace::from)
+#[pyfunction]
+pub(crate) fn second_order_model(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
+    read_second_order(a)?.state_space().or_raise().map(PyStateSpace::from)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn fit_velocity_loop<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn fit_velocity_loop<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (measured, gain_per_s) = (read_measured(a)?, a.number("position_gain_per_s")?);
     let (dt_s, delay_s) = (a.number("dt_s")?, a.maybe_number("delay_s")?);
     let fit = || identify::fit_velocity_loop(&measured, gain_per_s, dt_s, delay_s);
-    give_velocity_loop(a.py(), &interruptible(a.py(), fit)?.or_raise()?)
+    give_velocity_loop(a.py(), &computed(a.py(), fit)?)
 }
 
 /// Returns a fit by the names of `ilc_rt.fits.VelocityLoopFit`.
@@ -147,31 +121,25 @@ pub(crate) fn give_velocity_loop<'py>(py: Python<'py>, fit: &VelocityLoopFit) ->
     ))
 }
 
-#[pyfunction(signature = (frequency_hz, /, **model))]
+#[pyfunction]
 pub(crate) fn velocity_loop_response<'py>(
     frequency_hz: &Bound<'py, PyAny>,
-    model: Option<Keywords<'_, 'py>>,
+    a: Arguments<'_, 'py>,
 ) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
-    let a = Arguments::of(model)?;
-    let model = VelocityLoop {
-        gain: a.number("gain")?,
-        bandwidth_hz: a.number("bandwidth_hz")?,
-        delay_s: a.number("delay_s")?,
-        position_gain_per_s: a.number("position_gain_per_s")?,
-        dt_s: a.number("dt_s")?,
-    };
+    let model = read!(a, VelocityLoop:
+        [number => gain, bandwidth_hz, delay_s, position_gain_per_s, dt_s]
+    );
     Ok(give_vector(a.py(), model.response(&frequency_hz)))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn fit_rational<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn fit_rational<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (n_zeros, n_poles) = (a.whole("n_zeros")?, a.whole("n_poles")?);
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
     let delay_s = a.number("delay_s")?;
     let fit = || identify::fit_rational(&measured, n_zeros, n_poles, delay_s, dt_s);
-    let fit = interruptible(a.py(), fit)?.or_raise()?;
+    let fit = computed(a.py(), fit)?;
     let model = PyStateSpace::from(fit.model);
     Ok(by_name!(a.py(), [fit => delay_s, reflected_poles, residual_rms] model: model))
 }
@@ -179,29 +147,24 @@ pub(crate) fn fit_rational<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'
 /// Frequencies and bounds.
 type Bounds<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn uncertainty<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bounds<'py>> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn uncertainty<'py>(a: Arguments<'_, 'py>) -> PyResult<Bounds<'py>> {
     let (measured, model) = (read_measured(a)?, read_complex("model", &a.get("model")?)?);
     let found = identify::uncertainty(&measured, &model, a.number("deviations")?).or_raise()?;
     Ok((give_vector(a.py(), found.frequency_hz), give_vector(a.py(), found.bound)))
 }
 
-#[pyfunction(signature = (**keywords))]
+#[pyfunction]
 pub(crate) fn excitation<'py>(
-    keywords: Option<Keywords<'_, 'py>>,
+    a: Arguments<'_, 'py>,
 ) -> PyResult<(Bound<'py, PyAny>, usize, usize)> {
-    let a = Arguments::of(keywords)?;
     let dt_s = a.number("dt_s")?;
-    let excitation = Excitation {
-        waveform: read_waveform(&a.text("waveform")?)?,
-        amplitude: a.number("amplitude")?,
-        from_hz: a.number("from_hz")?,
-        to_hz: a.number("to_hz")?,
-        period_s: a.number("period_s")?,
-        periods: a.whole("periods")?,
-    };
-    let signal = interruptible(a.py(), || excitation.signal(dt_s))?.or_raise()?;
+    let excitation = read!(a, Excitation:
+        [number => amplitude, from_hz, to_hz, period_s]
+        [whole => periods]
+        waveform: a.choice("waveform", &WAVEFORMS)?,
+    );
+    let signal = computed(a.py(), || excitation.signal(dt_s))?;
     Ok((give_vector(a.py(), signal.values), signal.first_sample, signal.period_samples))
 }
 

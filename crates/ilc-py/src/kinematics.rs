@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, give_matrices, give_matrix, give_signal};
 use crate::argument::{Matrix, Signal, misfit};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::error::OrRaise;
 use crate::exceptions;
 use crate::made::{Made, New, made};
@@ -28,9 +28,7 @@ pub(crate) struct PyDelta {
 #[pymethods]
 impl PyDelta {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let (base_m, crank_m, rod_m) =
             (a.number("base_m")?, a.number("crank_m")?, a.number("rod_m")?);
         let delta = Delta::new(base_m, crank_m, rod_m).or_raise()?;
@@ -88,9 +86,7 @@ pub(crate) struct PyGantry {
 #[pymethods]
 impl PyGantry {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
         let orthogonality_rad = a.number("orthogonality_rad")?;
         let gantry = Gantry::new(orthogonality_rad).or_raise()?;
         made(a, Self { gantry, orthogonality_rad })
@@ -98,12 +94,12 @@ impl PyGantry {
 
     /// Return tool positions for axis positions in m: both (2,) or (n_samples, 2).
     fn forward<'py>(&self, axes_m: &Bound<'py, PyAny>) -> Array<'py> {
-        pairs("axes_m", axes_m, |axes| self.gantry.forward(axes))
+        Poses::read("axes_m", axes_m)?.mapped(axes_m.py(), |axes| Ok(self.gantry.forward(axes)))
     }
 
     /// Return axis positions for tool positions in m: both (2,) or (n_samples, 2).
     fn inverse<'py>(&self, tool_m: &Bound<'py, PyAny>) -> Array<'py> {
-        pairs("tool_m", tool_m, |tool| self.gantry.inverse(tool))
+        Poses::read("tool_m", tool_m)?.mapped(tool_m.py(), |tool| Ok(self.gantry.inverse(tool)))
     }
 
     /// Return the Jacobian, shape (2, 2), the same everywhere.
@@ -112,26 +108,26 @@ impl PyGantry {
     }
 }
 
-/// One triple, or one per sample.
-struct Poses {
-    values: Vec<[f64; 3]>,
+/// `N` coordinates, or as many per sample.
+struct Poses<const N: usize> {
+    values: Vec<[f64; N]>,
     is_single: bool,
 }
 
-impl Poses {
+impl<const N: usize> Poses<N> {
     fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
         let signal = Signal::read(name, object)?;
         let is_single = signal.is_flat;
         let coordinates = if is_single { signal.n_samples } else { signal.n_channels };
-        if coordinates != 3 {
-            return Err(misfit(name, &signal.shape(), "(3,) or (n_samples, 3)"));
+        if coordinates != N {
+            return Err(misfit(name, &signal.shape(), &format!("({N},) or (n_samples, {N})")));
         }
         Ok(Self { values: signal.values.as_chunks().0.to_vec(), is_single })
     }
 
     /// Applies a map of one pose to all; an error names the sample.
-    fn each<T>(&self, map: impl Fn([f64; 3]) -> Result<T, KinematicsError>) -> PyResult<Vec<T>> {
-        let mapped = |(sample, pose): (usize, &[f64; 3])| {
+    fn each<T>(&self, map: impl Fn([f64; N]) -> Result<T, KinematicsError>) -> PyResult<Vec<T>> {
+        let mapped = |(sample, pose): (usize, &[f64; N])| {
             map(*pose).map_err(|error| {
                 let place =
                     if self.is_single { String::new() } else { format!("sample {sample}: ") };
@@ -145,24 +141,10 @@ impl Poses {
     fn mapped(
         self,
         py: Python<'_>,
-        map: impl Fn([f64; 3]) -> Result<[f64; 3], KinematicsError>,
+        map: impl Fn([f64; N]) -> Result<[f64; N], KinematicsError>,
     ) -> Array<'_> {
-        give_signal(py, self.each(map)?.concat(), 3, self.is_single)
+        give_signal(py, self.each(map)?.concat(), N, self.is_single)
     }
-}
-
-fn pairs<'py>(
-    name: &str,
-    object: &Bound<'py, PyAny>,
-    map: impl Fn([f64; 2]) -> [f64; 2],
-) -> Array<'py> {
-    let signal = Signal::read(name, object)?;
-    let coordinates = if signal.is_flat { signal.n_samples } else { signal.n_channels };
-    if coordinates != 2 {
-        return Err(misfit(name, &signal.shape(), "(2,) or (n_samples, 2)"));
-    }
-    let mapped: Vec<f64> = signal.values.as_chunks().0.iter().flat_map(|pair| map(*pair)).collect();
-    give_signal(object.py(), mapped, 2, signal.is_flat)
 }
 
 fn square<const N: usize>(rows: &[[f64; N]; N]) -> Matrix {

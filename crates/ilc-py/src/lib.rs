@@ -6,10 +6,12 @@
 //! Family: `laws` and `python_law` call each other: an inner law may be written in Python.
 //!
 //! Family: `arguments`, `model` and `model_argument` read each other's arguments.
-//!
-//! Family: `experiment` and `identify` read each other's arguments.
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
+#![expect(
+    clippy::needless_pass_by_value,
+    reason = "arguments are owned, as Python hands them over"
+)]
 
 mod analysis;
 mod answer;
@@ -51,55 +53,38 @@ mod _native {
     #[pymodule_export]
     const TUNING_RUNS_MAX: usize = ilc_rt::learning::tune::RUNS_MAX;
     #[pymodule_export]
-    use super::analysis::{analyze, refuse_divergent, repeatability, tune};
-    #[pymodule_export]
-    use super::campaign::{EventStream, check_options, described_options, run_events};
-    #[pymodule_export]
-    use super::cell::PyCell;
-    #[pymodule_export]
-    use super::contour::{PyArc, PyLine, contour_error, coupling_gains, projection_across};
-    #[pymodule_export]
-    use super::control::{PyCascade, PyCrossCoupled, PyPid};
-    #[pymodule_export]
-    use super::exceptions::{
-        ContourError, KinematicsError, LearningError, ModelError, SignalError, TrajectoryError,
-    };
-    #[pymodule_export]
-    use super::experiment::{evaluate_experiment, identify_axis, single_experiment};
-    #[pymodule_export]
-    use super::identify::{
-        check_response, excitation, fit_rational, fit_second_order, fit_velocity_loop,
-        frequency_response, relative_deviation, second_order_model, second_order_response,
-        uncertainty, velocity_loop_response,
-    };
-    #[pymodule_export]
-    use super::kinematics::{PyDelta, PyGantry};
-    #[pymodule_export]
-    use super::laws::{PyLaw, recalled::check_relevance_weights};
-    #[pymodule_export]
-    use super::library::PyLibrary;
-    #[pymodule_export]
-    use super::made::{_made, _made_of_kind, Made};
-    #[pymodule_export]
-    use super::many::simulate_many;
-    #[pymodule_export]
-    use super::model::{PyStateSpace, discretize, from_transfer_function, second_order};
-    #[pymodule_export]
-    use super::move_plan::PyMovePlan;
-    #[pymodule_export]
-    use super::signal::{PyFilter, instantaneous_frequency, zero_phase};
-    #[pymodule_export]
-    use super::time_varying::PyTimeVarying;
-    #[pymodule_export]
-    use super::trajectory::{
-        butterfly, exponential_sigmoid, gcode, jerk_limited, modulated, raster, sigmoid_pair,
-        spiral, spline, tracking_index,
-    };
-    #[pymodule_export]
-    use super::transport::transports;
-    #[pymodule_export]
-    use super::weights::{
-        band_filter, contour_weights, coupled_weights, formation_errors, formation_weights,
-        schedule,
+    use super::{
+        analysis::{analyze, refuse_divergent, repeatability, tune},
+        campaign::{EventStream, check_options, described_options, run_events},
+        cell::PyCell,
+        contour::{PyArc, PyLine, contour_error, coupling_gains, projection_across},
+        control::{PyCascade, PyCrossCoupled, PyPid},
+        exceptions::{
+            ContourError, KinematicsError, LearningError, ModelError, SignalError, TrajectoryError,
+        },
+        experiment::{evaluate_experiment, identify_axis, single_experiment},
+        identify::{
+            check_response, excitation, fit_rational, fit_second_order, fit_velocity_loop,
+            frequency_response, relative_deviation, second_order_model, second_order_response,
+            uncertainty, velocity_loop_response,
+        },
+        kinematics::{PyDelta, PyGantry},
+        laws::{PyLaw, recalled::check_relevance_weights},
+        library::PyLibrary,
+        made::{_made, _made_of_kind, Made},
+        many::simulate_many,
+        model::{PyStateSpace, discretize, from_transfer_function, second_order},
+        move_plan::PyMovePlan,
+        signal::{PyFilter, instantaneous_frequency, zero_phase},
+        time_varying::PyTimeVarying,
+        trajectory::{
+            butterfly, exponential_sigmoid, gcode, jerk_limited, modulated, raster, sigmoid_pair,
+            spiral, spline, tracking_index,
+        },
+        transport::transports,
+        weights::{
+            band_filter, contour_weights, coupled_weights, formation_errors, formation_weights,
+            schedule,
+        },
     };
 }

@@ -1,119 +1,79 @@
 //! The iteration library: `Library`.
 
-use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Arc;
 
-use ilc_rt::library::{Elsewhere, Library, LibraryError, Page, Row, Task};
+use ilc_rt::library::{Elsewhere, Held, Library, LibraryError, Near, Page, Row, Task};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyIterator};
 
 use crate::answer::{ByName, by_name, give_signal, give_vector};
 use crate::argument::{Signal, read_disturbance};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::{Arguments, read};
 use crate::detached::detached;
-use crate::error::OrRaise;
-use crate::library_rows::{Raised, give_row, next_row};
+use crate::error::{OrRaise, Raised};
+use crate::library_rows::{give_row, next_row};
 use crate::made::{Made, New, made};
 use crate::whole;
 
 /// Runs of all campaigns, in memory or in one SQLite file.
 #[pyclass(name = "Library", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
-pub(crate) struct PyLibrary(Held);
-
-/// Storage of the runs.
-#[derive(Debug)]
-enum Held {
-    /// In memory, for the lifetime of this object.
-    Memory(Box<Mutex<Library>>),
-    /// In a file, opened for each operation.
-    File(PathBuf),
-}
+pub(crate) struct PyLibrary(pub(crate) Arc<Held>);
 
 #[pymethods]
 impl PyLibrary {
     #[new]
-    #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
-        let a = Arguments::of(keywords)?;
-        let path: PathBuf = a.get("path")?.extract()?;
-        if path.as_os_str() == ":memory:" {
-            let library = Library::in_memory().or_raise()?;
-            return made(a, Self(Held::Memory(Box::new(Mutex::new(library)))));
-        }
-        match Library::read(&path) {
-            Ok(_) => {}
-            // A new file is created at once, so that an unusable name is refused here.
-            Err(LibraryError::Missing { .. } | LibraryError::Empty { .. }) => {
-                Library::open(&path).or_raise()?;
-            }
-            refused @ Err(_) => drop(refused.or_raise()?),
-        }
-        made(a, Self(Held::File(path)))
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
+        let library = Held::new(a.get("path")?.extract()?).or_raise()?;
+        made(a, Self(Arc::new(library)))
     }
 
     /// Return a part of the stored runs, oldest first, without their arrays.
-    #[pyo3(signature = (cell=None, campaign=None, limit=None, offset=0))]
-    fn _page<'py>(
-        &self,
-        py: Python<'py>,
-        cell: Option<String>,
-        campaign: Option<String>,
-        limit: Option<usize>,
-        offset: usize,
-    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let page = Page { cell, campaign, offset, limit };
-        let rows = detached(py, || self.read(|library| library.page(&page))).or_raise()?;
-        rows.iter().map(|row| describe(py, row)).collect()
+    fn _page<'py>(&self, a: Arguments<'_, 'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let page = read!(a, Page:
+            [maybe_text => cell, campaign]
+            limit: a.maybe("limit", |_, limit| limit.extract())?,
+            offset: a.get("offset")?.extract()?,
+        );
+        let rows = self.read(a.py(), |library| library.page(&page))?;
+        rows.iter().map(|row| describe(a.py(), row)).collect()
     }
 
     /// Return the number of stored runs.
     fn _count(&self, py: Python<'_>) -> PyResult<usize> {
-        detached(py, || self.read(|library| library.count(None))).or_raise()
+        self.read(py, |library| library.count(None))
     }
 
     /// Return runs with their arrays, unchecked, to be stored elsewhere.
-    fn _rows<'py>(
-        &self,
-        py: Python<'py>,
-        ids: &Bound<'py, PyAny>,
-    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let ids: Vec<i64> = ids.extract()?;
-        let rows = detached(py, || {
-            self.read(|library| {
-                ids.iter().map(|id| library.load_unchecked(*id)).collect::<Result<Vec<_>, _>>()
-            })
-        });
-        rows.or_raise()?.iter().map(|row| give_row(py, row)).collect()
+    fn _rows<'py>(&self, py: Python<'py>, ids: Vec<i64>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let rows = self.read(py, |library| {
+            ids.iter().map(|id| library.load_unchecked(*id)).collect::<Result<Vec<_>, _>>()
+        })?;
+        rows.iter().map(|row| give_row(py, row)).collect()
     }
 
     /// Store runs of another library in one transaction, and return how many were new.
     fn _insert(&self, py: Python<'_>, rows: &Bound<'_, PyAny>) -> PyResult<usize> {
         let rows: Py<PyIterator> = rows.try_iter()?.unbind();
-        let inserted = detached(py, || {
-            self.write(|library| {
-                Ok(library.insert::<Raised>(std::iter::from_fn(|| next_row(&rows))))
-            })
-        });
-        inserted.or_raise()?.map_err(|Raised(error)| error)
+        let next = || next_row(&rows);
+        self.write(py, |library| Ok(library.insert::<Raised>(std::iter::from_fn(next))))?.or_raise()
     }
 
     /// Delete runs in one transaction.
-    fn _remove(&self, py: Python<'_>, ids: &Bound<'_, PyAny>) -> PyResult<()> {
-        let ids: Vec<i64> = ids.extract()?;
-        detached(py, || self.write(|library| library.remove(&ids))).or_raise()
+    fn _remove(&self, py: Python<'_>, ids: Vec<i64>) -> PyResult<()> {
+        self.write(py, |library| library.remove(&ids))
     }
 
     /// Return the space of deleted runs to the system.
     fn _shrink(&self, py: Python<'_>, n_deleted: usize) -> PyResult<()> {
-        detached(py, || self.write(|library| library.shrink(n_deleted))).or_raise()
+        self.write(py, |library| library.shrink(n_deleted))
     }
 
     /// Return a run with its arrays.
     fn load<'py>(&self, py: Python<'py>, id: &Bound<'py, PyAny>) -> ByName<'py> {
         let id = whole::id(id)?;
-        let row = detached(py, || self.read(|library| library.load(id))).or_raise()?;
+        let row = self.read(py, |library| library.load(id))?;
         let run = describe(py, &row)?;
         let Row { meta, record, .. } = row;
         let signal = |values| give_signal(py, values, meta.n_axes, false);
@@ -144,22 +104,17 @@ impl PyLibrary {
         let (disturbance, top) =
             (read_disturbance("disturbance", disturbance)?, whole::whole("top", top)?);
         let task = Task { cell };
-        let found = detached(py, || self.read(|library| library.recall(&disturbance, top, &task)))
-            .or_raise()?;
-        found
-            .iter()
-            .map(|near| {
-                let run = describe(py, &near.row)?;
-                run.set_item("distance", near.distance)?;
-                Ok(run)
-            })
-            .collect()
+        let found = self.read(py, |library| library.recall(&disturbance, top, &task))?;
+        let given = |near: &Near| {
+            let run = describe(py, &near.row)?;
+            run.set_item("distance", near.distance)?;
+            Ok(run)
+        };
+        found.iter().map(given).collect()
     }
 
     /// Store a run that was made elsewhere.
-    #[pyo3(signature = (**keywords))]
-    fn _append(&self, py: Python<'_>, keywords: Option<Keywords<'_, '_>>) -> PyResult<i64> {
-        let a = Arguments::of(keywords)?;
+    fn _append(&self, py: Python<'_>, a: Arguments<'_, '_>) -> PyResult<i64> {
         let u = a.signal("u")?;
         let alike = |name: &str, signal: &Bound<'_, PyAny>| {
             let signal = Signal::read(name, signal)?;
@@ -169,19 +124,17 @@ impl PyLibrary {
         let error_m = alike("e", &a.get("e")?)?;
         let reference_m =
             a.maybe("reference_m", alike)?.unwrap_or_else(|| vec![0.0; error_m.len()]);
-        let run = Elsewhere {
-            cell: a.text("cell")?,
-            campaign: a.text("campaign")?,
-            law: a.text("law")?,
-            cycle_s: a.number("cycle_s")?,
+        let run = read!(a, Elsewhere:
+            [text => cell, campaign, law]
+            [number => cycle_s]
             n_axes: u.n_channels,
-            reference_m,
-            error_m,
+            reference_m: reference_m,
+            error_m: error_m,
             disturbance: a.maybe("disturbance", read_disturbance)?.unwrap_or_default(),
             input: u.values,
-        };
+        );
         let (meta, record) = run.record().or_raise()?;
-        detached(py, || self.write(|library| library.append_next(&meta, record))).or_raise()
+        self.write(py, |library| library.append_next(&meta, record))
     }
 
     /// Return the keys of all but the most relevant runs.
@@ -192,31 +145,27 @@ impl PyLibrary {
         cell: Option<String>,
     ) -> PyResult<Vec<i64>> {
         let (task, keep) = (Task { cell }, whole::whole("keep", keep)?);
-        detached(py, || self.read(|library| library.least_relevant(keep, &task))).or_raise()
+        self.read(py, |library| library.least_relevant(keep, &task))
     }
 }
 
 impl PyLibrary {
-    /// Reads from the library.
-    pub(crate) fn read<T>(
+    /// Reads from the library while other Python threads run.
+    fn read<T: Send>(
         &self,
-        mut work: impl FnMut(&Library) -> Result<T, LibraryError>,
-    ) -> Result<T, LibraryError> {
-        match &self.0 {
-            Held::Memory(library) => work(&library.lock().unwrap_or_else(PoisonError::into_inner)),
-            Held::File(path) => Library::read_with(path, work),
-        }
+        py: Python<'_>,
+        work: impl FnMut(&Library) -> Result<T, LibraryError> + Send,
+    ) -> PyResult<T> {
+        detached(py, || self.0.read(work)).or_raise()
     }
 
-    /// Writes to the library.
-    fn write<T>(
+    /// Writes to the library while other Python threads run.
+    fn write<T: Send>(
         &self,
-        work: impl FnOnce(&Library) -> Result<T, LibraryError>,
-    ) -> Result<T, LibraryError> {
-        match &self.0 {
-            Held::Memory(library) => work(&library.lock().unwrap_or_else(PoisonError::into_inner)),
-            Held::File(path) => work(&Library::open(path)?),
-        }
+        py: Python<'_>,
+        work: impl FnOnce(&Library) -> Result<T, LibraryError> + Send,
+    ) -> PyResult<T> {
+        detached(py, || self.0.write(work)).or_raise()
     }
 }
 

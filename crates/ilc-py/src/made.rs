@@ -71,7 +71,7 @@ pub(crate) fn _made_of_kind<'py>(
     arguments: &Bound<'py, PyDict>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let native = class.py().import("ilc_rt._native")?.getattr(native)?;
-    native.getattr("__new__")?.call((class, kind), Some(arguments))
+    native.getattr("__new__")?.call1((class, kind, arguments))
 }
 
 /// Returns the result of `__reduce__` for a law or a filter, including the attributes of a derived

@@ -6,18 +6,15 @@ use ilc_rt::learning::batch::{self, Laws, Task};
 use pyo3::prelude::*;
 
 use crate::answer::{ByName, by_name, give_vector};
-use crate::argument::{read_disturbance, read_vector};
-use crate::arguments::{Arguments, Keywords};
-use crate::detached::interruptible;
-use crate::error::OrRaise;
+use crate::argument::{Channels, read_disturbance, read_vector};
+use crate::arguments::Arguments;
+use crate::detached::computed;
 use crate::laws::apart;
 use crate::model_argument::read_model;
-use crate::python_law::Channels;
 use crate::whole::{each, whole};
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn simulate_many<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn simulate_many<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let list = |name: &str, read: fn(&str, &Bound<'py, PyAny>) -> PyResult<Vec<f64>>| {
         each(name, &a.get(name)?, "a list of arrays", |one| read(name, one))
     };
@@ -51,7 +48,7 @@ pub(crate) fn simulate_many<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<
         seeds: &seeds,
         kept: [a.whole("kept_errors")?, a.whole("kept_inputs")?],
     };
-    let found = interruptible(a.py(), || batch::learn(&task, &laws))?.or_raise()?;
+    let found = computed(a.py(), || batch::learn(&task, &laws))?;
     let array = |values: Vec<f64>| give_vector(a.py(), values);
     Ok(by_name!(a.py(),
         rms: array(found.rms),

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, give_matrices, give_matrix, give_signal, give_vector};
 use crate::argument::{Signal, read_matrix, read_vector};
-use crate::arguments::{Arguments, Keywords};
-use crate::detached::interruptible;
+use crate::arguments::Arguments;
+use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
 use crate::whole::{number, whole};
@@ -63,11 +63,8 @@ impl From<StateSpace> for PyStateSpace {
     }
 }
 
-/// A new model, or the refusal of what it was to be made of.
-type NewModel = Result<StateSpace, ModelError>;
-
 /// Returns a new model to Python.
-fn give(model: NewModel) -> PyResult<PyStateSpace> {
+fn give(model: Result<StateSpace, ModelError>) -> PyResult<PyStateSpace> {
     model.or_raise().map(PyStateSpace::from)
 }
 
@@ -146,14 +143,14 @@ impl PyStateSpace {
     ) -> Array<'py> {
         let u = Signal::read("u", u)?.with_channels("u", self.n_inputs)?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
-        let y = interruptible(py, || self.model.simulate(&u.values, x0.as_deref()))?.or_raise()?;
+        let y = computed(py, || self.model.simulate(&u.values, x0.as_deref()))?;
         give_signal(py, y, self.n_outputs, u.is_flat && self.n_outputs == 1)
     }
 
     /// Return the first `n` Markov parameters D, CB, CAB, ..., shape (n, n_outputs, n_inputs).
     fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
-        let parameters = interruptible(py, || self.model.markov(n))?.or_raise()?;
+        let parameters = computed(py, || self.model.markov(n))?;
         let shape = (n, self.n_outputs, self.n_inputs);
         Ok(give_matrices(py, shape, |k, row, col| parameters[k][(row, col)]))
     }
@@ -163,7 +160,7 @@ impl PyStateSpace {
     /// The block lower-triangular Toeplitz matrix of the Markov parameters, sample by sample.
     fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
-        let lifted = interruptible(py, || self.model.lifted(n))?.or_raise()?;
+        let lifted = computed(py, || self.model.lifted(n))?;
         Ok(give_matrix(py, &lifted))
     }
 
@@ -194,7 +191,7 @@ impl PyStateSpace {
 
     /// Return the finite invariant zeros, in no particular order [emami1982].
     fn zeros<'py>(&self, py: Python<'py>) -> Array<'py> {
-        let zeros = interruptible(py, || self.model.zeros())?.or_raise()?;
+        let zeros = computed(py, || self.model.zeros())?;
         Ok(give_vector(py, zeros))
     }
 
@@ -206,7 +203,7 @@ impl PyStateSpace {
     /// Return C (q I - A)^-1 B + D at frequencies in rad/s, shape (n_frequencies, n_outputs, n_inputs).
     fn frequency_response<'py>(&self, py: Python<'py>, w_rad_s: &Bound<'py, PyAny>) -> Array<'py> {
         let w = read_vector("w_rad_s", w_rad_s)?;
-        let response = interruptible(py, || self.model.frequency_response(&w))?.or_raise()?;
+        let response = computed(py, || self.model.frequency_response(&w))?;
         let shape = (w.len(), self.n_outputs, self.n_inputs);
         Ok(give_matrices(py, shape, |k, row, col| response[k][(row, col)]))
     }
@@ -223,7 +220,7 @@ impl PyStateSpace {
         let w = read_vector("w_rad_s", w_rad_s)?;
         let output = output.map_or(Ok(0), |output| whole("output", output))?;
         let input = input.map_or(Ok(0), |input| whole("input", input))?;
-        let bode = interruptible(py, || self.model.bode(&w, output, input))?.or_raise()?;
+        let bode = computed(py, || self.model.bode(&w, output, input))?;
         Ok((give_vector(py, bode.magnitude), give_vector(py, bode.phase_rad)))
     }
 
@@ -312,7 +309,6 @@ impl PyStateSpace {
         give(self.model.inverse())
     }
 
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn _select(&self, outputs: Vec<usize>, inputs: Vec<usize>) -> PyResult<Self> {
         give(self.model.select(&outputs, &inputs))
     }
@@ -387,24 +383,21 @@ impl PyStateSpace {
     }
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn from_transfer_function(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn from_transfer_function(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let dt_s = a.maybe("dt_s", read_sample_time)?.flatten();
     let (num, den) = (a.vector("num")?, a.vector("den")?);
     give(model::from_transfer_function(&num, &den, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn second_order(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn second_order(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let (w0, damping) = (a.number("natural_frequency_rad_s")?, a.number("damping")?);
     give(model::second_order(w0, damping))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn discretize(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn discretize(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let methods = [("zoh", Method::ZeroOrderHold), ("tustin", Method::Tustin)];
     let (model, dt_s) = (a.model("model")?, a.number("dt_s")?);
     let method = a.choice("method", &methods)?;

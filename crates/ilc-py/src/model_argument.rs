@@ -6,7 +6,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
-use crate::argument::{Matrix, read_matrix, read_vector};
+use crate::argument::{Channels, Matrix, read_matrix, read_vector};
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
 use crate::time_varying::PyTimeVarying;
@@ -49,12 +49,11 @@ fn read_transfer_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<State
     };
     let mut entries = Vec::with_capacity(num.len());
     for (row, numerators) in num.iter().enumerate() {
-        let mut entry = Vec::with_capacity(numerators.len());
-        for (col, numerator) in numerators.iter().enumerate() {
+        let entry = |(col, numerator)| {
             let denominator = den.get(row).and_then(|row| row.get(col));
-            entry.push((read("num", Some(numerator))?, read("den", denominator)?));
-        }
-        entries.push(entry);
+            Ok((read("num", Some(numerator))?, read("den", denominator)?))
+        };
+        entries.push(numerators.iter().enumerate().map(entry).collect::<PyResult<Vec<_>>>()?);
     }
     from_transfer_matrix(&entries, read_time_base(name, object)?).or_raise()
 }
@@ -85,12 +84,8 @@ impl AnyModel {
         }
     }
 
-    pub(crate) fn n_inputs(&self) -> usize {
-        self.plant().at(0).n_inputs()
-    }
-
-    pub(crate) fn n_outputs(&self) -> usize {
-        self.plant().at(0).n_outputs()
+    pub(crate) fn channels(&self) -> Channels {
+        Channels::of(self.plant().at(0))
     }
 }
 

@@ -1,89 +1,72 @@
 //! Plans of moves without samples: the native side of `ilc_rt.trajectory.MovePlan`.
 
-use ilc_rt::trajectory::{AxisLimits, Linear, LinearSetting, PathSegment};
+use ilc_rt::trajectory::{Linear, PathSegment};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::answer::{Array, by_name, give_signal, give_vector};
+use crate::answer::{give_signal, give_vector};
 use crate::argument::{Signal, misfit, read_array};
-use crate::arguments::chosen;
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::trajectory::{SETTINGS, limits_of, read_each};
+use crate::made::{Made, New, made};
+use crate::trajectory::{SETTINGS, read_each, read_limits};
 
 /// Moves planned, or times evaluated, in less than about 100 us: other threads do not wait.
 const FEW: usize = 32;
 
-#[pyclass(name = "MovePlan", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "MovePlan", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
-pub(crate) struct PyMovePlan {
-    plan: Linear,
-    points_m: Vec<f64>,
-    feeds_m_s: Vec<f64>,
-    limits: Vec<AxisLimits>,
-    setting: LinearSetting,
-    start_velocity_m_s: Vec<f64>,
-}
+pub(crate) struct PyMovePlan(Linear);
 
 #[pymethods]
 impl PyMovePlan {
     #[new]
-    fn new(
-        points_m: &Bound<'_, PyAny>,
-        feed_m_s: &Bound<'_, PyAny>,
-        velocity_max_m_s: &Bound<'_, PyAny>,
-        acceleration_max_m_s2: &Bound<'_, PyAny>,
-        jerk_max_m_s3: &Bound<'_, PyAny>,
-        setting: &Bound<'_, PyAny>,
-        start_velocity_m_s: &Bound<'_, PyAny>,
-    ) -> PyResult<Self> {
-        let py = points_m.py();
-        let Signal { values: points_m, layout } = Signal::read("points_m", points_m)?;
+    fn new(a: Arguments<'_, '_>) -> New<Self> {
+        let Signal { values: points_m, layout } = a.signal("points_m")?;
         let n_axes = layout.n_channels;
-        let feeds_m_s = read_each("feed_m_s", feed_m_s, layout.n_samples - 1)?;
-        let limits = limits_of(n_axes, [velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3])?;
-        let setting = chosen("setting", setting, &SETTINGS)?;
-        let start_velocity_m_s = read_each("start_velocity_m_s", start_velocity_m_s, n_axes)?;
+        let each = |name: &str, n| read_each(name, &a.get(name)?, n);
+        let feeds_m_s = each("feed_m_s", layout.n_samples - 1)?;
+        let (limits, setting) = (read_limits(a, n_axes)?, a.choice("setting", &SETTINGS)?);
+        let velocity_m_s = each("start_velocity_m_s", n_axes)?;
         let planned = || {
             let (start_m, ends_m) = points_m.split_at(n_axes);
-            let moves = ends_m.chunks(n_axes).zip(&feeds_m_s);
-            let segments: Vec<_> =
-                moves.map(|(to_m, feed)| PathSegment::line(to_m.to_vec(), *feed)).collect();
-            Linear::plan_moving(start_m, &start_velocity_m_s, &segments, &limits, setting)
+            let segments = PathSegment::lines(ends_m, n_axes, &feeds_m_s);
+            Linear::plan_moving(start_m, &velocity_m_s, &segments, &limits, setting)
         };
         let is_short = layout.n_samples <= FEW;
-        let plan = if is_short { planned() } else { detached(py, planned) }.or_raise()?;
-        Ok(Self { plan, points_m, feeds_m_s, limits, setting, start_velocity_m_s })
+        let plan = if is_short { planned() } else { detached(a.py(), planned) }.or_raise()?;
+        made(a, Self(plan))
     }
 
     /// Time from the start to the end, at rest, in s.
     #[getter]
     fn duration_s(&self) -> f64 {
-        self.plan.duration_s()
+        self.0.duration_s()
     }
 
     /// Duration without limits, in s.
     #[getter]
     fn nominal_s(&self) -> f64 {
-        self.plan.nominal_s()
+        self.0.nominal_s()
     }
 
     /// Number of axes.
     #[getter]
     fn n_axes(&self) -> usize {
-        self.plan.n_axes()
+        self.0.n_axes()
     }
 
     /// Number of moves.
     #[getter]
     fn n_moves(&self) -> usize {
-        self.plan.starts_s().len()
+        self.0.starts_s().len()
     }
 
     /// Times from the start at which the moves begin in s, shape (n_moves,).
     #[getter]
     fn starts_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        give_vector(py, self.plan.starts_s().collect())
+        give_vector(py, self.0.starts_s().collect())
     }
 
     /// Return positions in m, velocities in m/s and accelerations in m/s^2 at times from the start in s.
@@ -95,24 +78,10 @@ impl PyMovePlan {
         if shape.len() > 1 {
             return Err(misfit("t_s", &shape, "() or (n_times,)"));
         }
-        let n_axes = self.plan.n_axes();
-        let evaluated = || {
-            let mut tables = [(); 3].map(|()| Vec::with_capacity(times_s.len() * n_axes));
-            for t_s in &times_s {
-                let state = self.plan.at(*t_s);
-                let values = [state.position_m, state.velocity_m_s, state.acceleration_m_s2];
-                for (table, values) in tables.iter_mut().zip(values) {
-                    table.extend_from_slice(&values[..n_axes]);
-                }
-            }
-            tables
-        };
+        let evaluated = || self.0.tables_at(&times_s);
         let tables = if times_s.len() <= FEW { evaluated() } else { detached(py, evaluated) };
-        let given: Vec<Bound<'py, PyAny>> = tables
-            .into_iter()
-            .map(|table| give_signal(py, table, n_axes, shape.is_empty()))
-            .collect::<PyResult<_>>()?;
-        PyTuple::new(py, given)
+        let give = |table| give_signal(py, table, self.n_axes(), shape.is_empty());
+        PyTuple::new(py, tables.into_iter().map(give).collect::<PyResult<Vec<_>>>()?)
     }
 
     fn __repr__(&self) -> String {
@@ -122,25 +91,5 @@ impl PyMovePlan {
             self.n_axes(),
             self.duration_s()
         )
-    }
-
-    /// Pickled and copied as its arguments.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
-        let (py, this) = (slf.py(), slf.get());
-        let each =
-            |limit: fn(&AxisLimits) -> f64| -> Vec<f64> { this.limits.iter().map(limit).collect() };
-        let name = SETTINGS.iter().find(|(_, setting)| *setting == this.setting);
-        let arguments = by_name!(py,
-            points_m: give_signal(py, this.points_m.clone(), this.plan.n_axes(), false)?,
-            feed_m_s: give_vector(py, this.feeds_m_s.clone()),
-            velocity_max_m_s: give_vector(py, each(|limits| limits.velocity_max_m_s)),
-            acceleration_max_m_s2: give_vector(py, each(|limits| limits.acceleration_max_m_s2)),
-            jerk_max_m_s3: give_vector(py, each(|limits| limits.jerk_max_m_s3)),
-            setting: name.map(|(name, _)| *name),
-            start_velocity_m_s: give_vector(py, this.start_velocity_m_s.clone()),
-        );
-        let maker = py.import("ilc_rt._native")?.getattr("_made")?;
-        let parts = (slf.get_type(), py.None(), arguments);
-        Ok((maker, parts).into_pyobject(py)?.into_any())
     }
 }

@@ -9,16 +9,9 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::answer::{give_signal, give_vector};
-use crate::argument::Signal;
+use crate::argument::{Channels, Signal};
 use crate::laws::PyLaw;
 use crate::whole::shown;
-
-/// Channels of the signals passed to a Python object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Channels {
-    pub(crate) n_inputs: usize,
-    pub(crate) n_outputs: usize,
-}
 
 /// Data exchanged between a Python object and its caller, besides the signals.
 #[derive(Debug, Default)]
@@ -93,13 +86,13 @@ impl PythonLaw {
         let is_flat = self.frame.is_flat();
         let given = self.frame.disturbance.lock().unwrap_or_else(PoisonError::into_inner).take();
         let announced = self.next_disturbance.take();
-        let disturbance = match (given, announced) {
-            (Some(given), Some(announced)) => {
+        let disturbance = if let Some(given) = given {
+            if let Some(announced) = announced {
                 self.announce(py, announced);
-                Some(given.into_bound(py))
             }
-            (Some(given), None) => Some(given.into_bound(py)),
-            (None, announced) => announced.map(|values| give_vector(py, values)),
+            Some(given.into_bound(py))
+        } else {
+            announced.map(|values| give_vector(py, values))
         };
         let u = give_signal(py, input.to_vec(), n_inputs, is_flat && n_inputs == 1)?;
         let e = give_signal(py, error.to_vec(), n_outputs, is_flat && n_outputs == 1)?;

@@ -8,9 +8,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-use crate::answer::{Array, ByName, give_signal, give_vector};
+use crate::answer::{Array, ByName, by_name, give_signal, give_vector};
 use crate::argument::{Layout, Signal, read_vector};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
@@ -29,21 +29,14 @@ pub(crate) struct PyFilter {
 #[pymethods]
 impl PyFilter {
     #[new]
-    #[pyo3(signature = (kind, /, **arguments))]
-    fn new(py: Python<'_>, kind: String, arguments: Option<Keywords<'_, '_>>) -> PyResult<Self> {
-        let none = PyDict::new(py);
-        let kept = Arguments::new(arguments.unwrap_or(&none)).kept()?;
+    fn new(kind: String, arguments: Arguments<'_, '_>) -> PyResult<Self> {
+        let kept = arguments.kept()?;
         let a = Arguments::new(&kept);
         let filter = match kind.as_str() {
             "butterworth" => {
                 let (order, cutoff_hz) = (a.whole("order")?, a.number("cutoff_hz")?);
-                let sections =
-                    signal::butterworth(order, cutoff_hz, a.number("dt_s")?).or_raise()?;
-                if a.flag("causal")? {
-                    QFilter::Causal(sections)
-                } else {
-                    QFilter::ZeroPhase(sections)
-                }
+                let kind = if a.flag("causal")? { QFilter::Causal } else { QFilter::ZeroPhase };
+                kind(signal::butterworth(order, cutoff_hz, a.number("dt_s")?).or_raise()?)
             }
             "gaussian" => QFilter::Gaussian(
                 GaussianFilter::new(a.number("bandwidth_hz")?, a.number("dt_s")?).or_raise()?,
@@ -100,24 +93,18 @@ impl PyFilter {
     /// Parameters of the filter by name, in addition to its arguments.
     fn _figures<'py>(&self, py: Python<'py>) -> ByName<'py> {
         let figures = self.arguments.bind(py).copy()?;
-        match &self.filter {
-            QFilter::Gaussian(filter) => {
-                figures.set_item("sigma_samples", filter.sigma_samples())?;
-            }
-            QFilter::Fir(filter) => {
-                figures.set_item("taps", give_vector(py, filter.taps().to_vec()))?;
-            }
-            QFilter::Switched(filter) => {
-                let segments = filter.segments();
-                let cutoffs_hz: Vec<f64> = segments.iter().map(|found| found.cutoff_hz).collect();
-                let starts: Vec<usize> = segments.iter().map(|found| found.start).collect();
-                figures.set_item("cutoffs_hz", cutoffs_hz)?;
-                figures.set_item("starts", starts)?;
-                figures.set_item("order", filter.order())?;
-                figures.set_item("blend", filter.blend())?;
-            }
-            _ => {}
-        }
+        let others = match &self.filter {
+            QFilter::Gaussian(filter) => by_name!(py, sigma_samples: filter.sigma_samples()),
+            QFilter::Fir(filter) => by_name!(py, taps: give_vector(py, filter.taps().to_vec())),
+            QFilter::Switched(filter) => by_name!(py,
+                cutoffs_hz: filter.segments().iter().map(|part| part.cutoff_hz).collect::<Vec<_>>(),
+                starts: filter.segments().iter().map(|part| part.start).collect::<Vec<_>>(),
+                order: filter.order(),
+                blend: filter.blend(),
+            ),
+            _ => return Ok(figures),
+        };
+        figures.update(others.as_mapping())?;
         Ok(figures)
     }
 
@@ -158,18 +145,14 @@ fn switched(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
     let cutoffs_hz = a.vector("cutoffs_hz")?;
     let starts = a.get("starts")?;
     let starts = each("starts", &starts, "a sequence of samples", |start| whole("starts", start))?;
-    if cutoffs_hz.len() != starts.len() {
-        return Err(exceptions::SignalError::new_err(format!(
-            "{} cutoffs_hz for {} starts; as many are needed",
-            cutoffs_hz.len(),
-            starts.len()
-        )));
+    let (n_cutoffs, n_starts) = (cutoffs_hz.len(), starts.len());
+    if n_cutoffs != n_starts {
+        let line = format!("{n_cutoffs} cutoffs_hz for {n_starts} starts; as many are needed");
+        return Err(exceptions::SignalError::new_err(line));
     }
-    let segments: Vec<Segment> = starts
-        .into_iter()
-        .zip(cutoffs_hz)
-        .map(|(start, cutoff_hz)| Segment { start, cutoff_hz })
-        .collect();
+    let segments = starts.into_iter().zip(cutoffs_hz);
+    let segments: Vec<_> =
+        segments.map(|(start, cutoff_hz)| Segment { start, cutoff_hz }).collect();
     SwitchedFilter::new(a.whole("order")?, &segments, a.whole("blend")?, a.number("dt_s")?)
         .or_raise()
 }
@@ -189,7 +172,7 @@ fn from_signal(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
 }
 
 /// Reads a filter, an array of taps, or no filter.
-pub(crate) fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyResult<QFilter> {
+fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyResult<QFilter> {
     let Some(object) = object else { return Ok(QFilter::None) };
     if let Ok(filter) = object.cast::<PyFilter>() {
         return Ok(filter.get().filter.clone());
@@ -202,6 +185,11 @@ pub(crate) fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyRe
         )));
     }
     Ok(QFilter::Fir(FirFilter::new(&read_vector(name, object)?).or_raise()?))
+}
+
+/// Reads such a filter from an argument.
+pub(crate) fn given_filter(a: Arguments<'_, '_>, name: &str) -> PyResult<QFilter> {
+    read_filter(name, a.given(name)?.as_ref())
 }
 
 fn without_lag(filter: &QFilter) -> QFilter {
@@ -224,9 +212,8 @@ pub(crate) fn zero_phase<'py>(filter: &Bound<'py, PyAny>, x: &Bound<'py, PyAny>)
     filtered(&without_lag(&read_filter("filter", Some(filter))?), x)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn instantaneous_frequency<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn instantaneous_frequency<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (x, dt_s) = (a.vector("x")?, a.number("dt_s")?);
     let found = detached(a.py(), || signal::instantaneous_frequency(&x, dt_s)).or_raise()?;
     Ok(give_vector(a.py(), found))

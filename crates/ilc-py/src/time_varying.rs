@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, give_matrices, give_signal};
 use crate::argument::{Matrix, Signal, misfit, read_array, read_vector};
-use crate::detached::interruptible;
+use crate::detached::computed;
 use crate::error::OrRaise;
 use crate::whole::Real;
 
@@ -153,13 +153,7 @@ impl PyTimeVarying {
     /// Pickled and copied as its matrices.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
-        let parts = (
-            this.give(py, StateSpace::a),
-            this.give(py, StateSpace::b),
-            this.give(py, StateSpace::c),
-            this.give(py, StateSpace::d),
-            this.dt_s,
-        );
+        let parts = (this.a(py), this.b(py), this.c(py), this.d(py), this.dt_s);
         Ok((slf.get_type().into_any(), parts.into_pyobject(py)?.into_any()))
     }
 
@@ -198,7 +192,7 @@ impl PyTimeVarying {
             .with_samples("u", self.n_samples)?
             .with_channels("u", self.n_inputs)?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
-        let y = interruptible(py, || self.model.simulate(&u.values, x0.as_deref()))?.or_raise()?;
+        let y = computed(py, || self.model.simulate(&u.values, x0.as_deref()))?;
         give_signal(py, y, self.n_outputs, u.is_flat && self.n_outputs == 1)
     }
 

@@ -20,10 +20,9 @@ use pyo3::prelude::*;
 
 use crate::answer::{ByName, by_name, give_signal};
 use crate::argument::read_vector;
-use crate::arguments::{Arguments, Keywords};
-use crate::detached::interruptible;
+use crate::arguments::{Arguments, read};
+use crate::detached::computed;
 use crate::error::OrRaise;
-use crate::exceptions;
 
 /// A chosen alpha: segment, place, value, and its admissible intervals.
 type Alpha = (usize, String, f64, Vec<(f64, f64)>);
@@ -34,13 +33,10 @@ type Planned = Result<(SampledMotion, Vec<Alpha>), TrajectoryError>;
 pub(crate) const SETTINGS: [(&str, LinearSetting); 2] =
     [("complete", LinearSetting::CompleteEveryMove), ("on_time", LinearSetting::StartOnTime)];
 
-/// Names of the limits of the axes.
-const LIMITS: [&str; 3] = ["velocity_max_m_s", "acceleration_max_m_s2", "jerk_max_m_s3"];
-
 /// Plans a motion while other Python threads run, and returns its samples by name.
 fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> ByName<'_> {
     let begun = Instant::now();
-    let (motion, alphas) = interruptible(py, plan)?.or_raise()?;
+    let (motion, alphas) = computed(py, plan)?;
     let computing_s = begun.elapsed().as_secs_f64();
     let signal = |values| give_signal(py, values, motion.n_axes, false);
     Ok(by_name!(py,
@@ -54,10 +50,11 @@ fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> ByName<'_> 
     ))
 }
 
-/// Reads the points of a path, one per row.
-fn read_points(a: Arguments<'_, '_>) -> PyResult<Vec<Vec<f64>>> {
-    let points = a.signal("points_m")?;
-    Ok(points.values.chunks(points.n_channels).map(<[f64]>::to_vec).collect())
+/// Reads the points of a path: the coordinates of the first, and those of the others.
+fn read_points(a: Arguments<'_, '_>) -> PyResult<(Vec<f64>, Vec<f64>)> {
+    let mut start = a.signal("points_m")?;
+    let ends = start.values.split_off(start.n_channels);
+    Ok((start.values, ends))
 }
 
 /// Reads a number for all of `n`, or one for each.
@@ -77,38 +74,21 @@ pub(crate) fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyRe
     )))
 }
 
-/// Reads the limits of `n_axes` axes.
-fn read_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<Vec<AxisLimits>> {
-    let [velocity, acceleration, jerk] = LIMITS.map(|name| a.get(name));
-    limits_of(n_axes, [&velocity?, &acceleration?, &jerk?])
-}
-
 /// Reads the limits of `n_axes` axes from those of velocity, acceleration and jerk.
-pub(crate) fn limits_of(
-    n_axes: usize,
-    [velocity, acceleration, jerk]: [&Bound<'_, PyAny>; 3],
-) -> PyResult<Vec<AxisLimits>> {
+pub(crate) fn read_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<Vec<AxisLimits>> {
     if !(1..=MAX_AXES).contains(&n_axes) {
         return Err(TrajectoryError::from(MoveError::Axes { n_axes })).or_raise();
     }
-    let velocity = read_each(LIMITS[0], velocity, n_axes)?;
-    let acceleration = read_each(LIMITS[1], acceleration, n_axes)?;
-    let jerk = read_each(LIMITS[2], jerk, n_axes)?;
+    let each = |name| read_each(name, &a.get(name)?, n_axes);
+    let velocity = each("velocity_max_m_s")?;
+    let acceleration = each("acceleration_max_m_s2")?;
+    let jerk = each("jerk_max_m_s3")?;
     let axis = |i| AxisLimits {
         velocity_max_m_s: velocity[i],
         acceleration_max_m_s2: acceleration[i],
         jerk_max_m_s3: jerk[i],
     };
     Ok((0..n_axes).map(axis).collect())
-}
-
-/// Reads the limits of a run along a curve.
-fn read_run_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<RunLimits> {
-    Ok(RunLimits {
-        feed_m_s: a.number("feed_m_s")?,
-        curvature_acceleration_max_m_s2: a.number("curvature_acceleration_max_m_s2")?,
-        axes: read_limits(a, n_axes)?,
-    })
 }
 
 /// Reads a point in the plane.
@@ -128,10 +108,7 @@ fn sample_linear(
     dt_s: f64,
 ) -> Planned {
     let plan = Linear::plan(start_m, segments, limits, setting)?;
-    let motion = SampledMotion::sample(plan.duration_s(), dt_s, plan.n_axes(), |t_s| {
-        (plan.at(t_s), plan.programmed_m(t_s))
-    })?;
-    Ok((motion.verified(limits)?, Vec::new()))
+    Ok((plan.sampled(dt_s)?.verified(limits)?, Vec::new()))
 }
 
 fn sample_exponential(
@@ -142,161 +119,144 @@ fn sample_exponential(
     dt_s: f64,
 ) -> Planned {
     let plan = ExponentialSigmoid::plan_below(start_m, segments, limits, alpha_max)?;
-    let motion = SampledMotion::sample(plan.duration_s(), dt_s, plan.n_axes(), |t_s| {
-        (plan.at(t_s), plan.programmed_m(t_s))
-    })?;
     let alphas = plan.choices().iter().map(|choice| {
         let intervals = choice.admissible.iter().map(|i| (i.from, i.to)).collect();
         (choice.segment, choice.place.to_owned(), choice.alpha, intervals)
     });
-    let alphas = alphas.collect();
-    Ok((motion.verified(limits)?, alphas))
+    Ok((plan.sampled(dt_s)?.verified(limits)?, alphas.collect()))
 }
 
-fn sample_run(curve: &impl Curve, limits: &RunLimits, dt_s: f64) -> Planned {
-    Ok((Run::plan(curve, limits, dt_s)?.motion().clone(), Vec::new()))
+/// Plans a run along a curve.
+fn along<'py, C: Curve>(
+    a: Arguments<'_, 'py>,
+    n_axes: usize,
+    curve: impl FnOnce() -> Result<C, TrajectoryError> + Send,
+) -> ByName<'py> {
+    let limits = read!(a, RunLimits:
+        [number => feed_m_s, curvature_acceleration_max_m_s2]
+        axes: read_limits(a, n_axes)?,
+    );
+    let dt_s = a.number("dt_s")?;
+    let plan = || Ok((Run::plan(&curve()?, &limits, dt_s)?.motion().clone(), Vec::new()));
+    planned(a.py(), plan)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn jerk_limited<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
-    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
-    let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, points.len() - 1)?;
-    let limits = read_limits(a, points[0].len())?;
-    let setting = a.choice("setting", &SETTINGS)?;
-    let moves = points.iter().skip(1).zip(&feeds);
-    let segments: Vec<_> =
-        moves.map(|(to_m, feed)| PathSegment::line(to_m.clone(), *feed)).collect();
-    planned(a.py(), || sample_linear(&points[0], &segments, &limits, setting, dt_s))
+#[pyfunction]
+pub(crate) fn jerk_limited<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
+    let ((start, ends), dt_s) = (read_points(a)?, a.number("dt_s")?);
+    let n_axes = start.len();
+    let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, ends.len() / n_axes)?;
+    let (limits, setting) = (read_limits(a, n_axes)?, a.choice("setting", &SETTINGS)?);
+    let segments = PathSegment::lines(&ends, n_axes, &feeds);
+    planned(a.py(), || sample_linear(&start, &segments, &limits, setting, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
-    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
-    let n_legs = points.len() - 1;
-    let each = |name: &str| match a.given(name)? {
-        Some(given) => read_each(name, &given, n_legs),
-        None => Ok(vec![0.0; n_legs]),
+#[pyfunction]
+pub(crate) fn exponential_sigmoid<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
+    let ((start, ends), dt_s) = (read_points(a)?, a.number("dt_s")?);
+    let (n_axes, n_legs) = (start.len(), ends.len() / start.len());
+    let each = |name: &str| {
+        a.maybe(name, |name, given| read_each(name, given, n_legs))
+            .map(|given| given.unwrap_or_else(|| vec![0.0; n_legs]))
     };
     let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, n_legs)?;
     let (amplitudes, frequencies) = (each("amplitude_m")?, each("frequency_hz")?);
-    let limits = read_limits(a, points[0].len())?;
-    let segment = |i: usize| ModulatedSegment {
-        to_m: points[i + 1].clone(),
+    let limits = read_limits(a, n_axes)?;
+    let segment = |(i, to_m): (usize, &[f64])| ModulatedSegment {
+        to_m: to_m.to_vec(),
         feed_m_s: feeds[i],
         amplitude_m: amplitudes[i],
         frequency_hz: frequencies[i],
     };
-    let segments: Vec<ModulatedSegment> = (0..n_legs).map(segment).collect();
+    let segments: Vec<_> = ends.chunks(n_axes).enumerate().map(segment).collect();
     let alpha_max = a.maybe("alpha_max", |_, bounds| {
         let [start_up, transition, end] = bounds.extract::<[f64; 3]>()?;
         Ok(AlphaMax { start_up, transition, end })
     })?;
     let alpha_max = alpha_max.unwrap_or_default();
-    planned(a.py(), || sample_exponential(&points[0], &segments, &limits, &alpha_max, dt_s))
+    planned(a.py(), || sample_exponential(&start, &segments, &limits, &alpha_max, dt_s))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn modulated<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
-    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
-    let [start, end] = &points[..] else {
-        return Err(PyValueError::new_err(format!(
-            "points_m has {} rows; start and end, 2, are needed",
-            points.len()
-        )));
-    };
+#[pyfunction]
+pub(crate) fn modulated<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
+    let ((start, end), dt_s) = (read_points(a)?, a.number("dt_s")?);
+    if start.len() != end.len() {
+        let n_rows = 1 + end.len() / start.len();
+        let line = format!("points_m has {n_rows} rows; start and end, 2, are needed");
+        return Err(PyValueError::new_err(line));
+    }
     let limits = read_limits(a, start.len())?;
-    let segment = ModulatedSegment {
-        to_m: end.clone(),
-        feed_m_s: a.number("feed_m_s")?,
-        amplitude_m: a.number("amplitude_m")?,
-        frequency_hz: a.number("frequency_hz")?,
-    };
+    let segment =
+        read!(a, ModulatedSegment: [number => feed_m_s, amplitude_m, frequency_hz] to_m: end);
     let [complete, on_time] = SETTINGS.map(|(word, setting)| (word, Some(setting)));
     let interpolations = [("exponential_sigmoid", None), complete, on_time];
-    match a.choice("interpolation", &interpolations)? {
-        None => {
-            let alpha_max = AlphaMax::default();
-            planned(a.py(), || sample_exponential(start, &[segment], &limits, &alpha_max, dt_s))
+    let setting = a.choice("interpolation", &interpolations)?;
+    planned(a.py(), || match setting {
+        None => sample_exponential(&start, &[segment], &limits, &AlphaMax::default(), dt_s),
+        Some(setting) => {
+            let program = points_program(&start, &segment, POINTS_A_PERIOD)?;
+            sample_linear(&start, &program, &limits, setting, dt_s)
         }
-        Some(setting) => planned(a.py(), || {
-            let program = points_program(start, &segment, POINTS_A_PERIOD)?;
-            sample_linear(start, &program, &limits, setting, dt_s)
-        }),
-    }
+    })
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn sigmoid_pair<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn sigmoid_pair<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (velocity, amplitude) = (a.pair("velocity_m_s")?, a.pair("amplitude_m")?);
     let (omega, phase_zero) = (a.pair("omega_rad_s")?, a.pair("phase_zero_s")?);
-    let pair = Listing {
-        legs: std::array::from_fn(|i| ListedLeg {
-            velocity_m_s: velocity[i],
-            amplitude_m: amplitude[i],
-            omega_rad_s: omega[i],
-            phase_zero_s: phase_zero[i],
-        }),
-        corner_s: a.number("corner_s")?,
-        start_alpha: a.number("start_alpha")?,
-        transition_alpha: a.number("transition_alpha")?,
-        sine_alpha: a.number("sine_alpha")?,
-        sine_offset_s: a.number("sine_offset_s")?,
+    let leg = |i: usize| ListedLeg {
+        velocity_m_s: velocity[i],
+        amplitude_m: amplitude[i],
+        omega_rad_s: omega[i],
+        phase_zero_s: phase_zero[i],
     };
+    let pair = read!(a, Listing:
+        [number => corner_s, start_alpha, transition_alpha, sine_alpha, sine_offset_s]
+        legs: [leg(0), leg(1)],
+    );
     let (duration_s, dt_s) = (a.number("duration_s")?, a.number("dt_s")?);
     planned(a.py(), || Ok((pair.sample(duration_s, dt_s)?, Vec::new())))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn spline<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
-    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
-    let limits = read_run_limits(a, points[0].len())?;
-    planned(a.py(), || sample_run(&Spline::through(&points)?, &limits, dt_s))
+#[pyfunction]
+pub(crate) fn spline<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
+    let points = a.signal("points_m")?;
+    let n_axes = points.n_channels;
+    let points: Vec<Vec<f64>> = points.values.chunks(n_axes).map(<[f64]>::to_vec).collect();
+    along(a, n_axes, || Spline::through(&points))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn butterfly<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
-    let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
+#[pyfunction]
+pub(crate) fn butterfly<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (scale_m, turns) = (a.number("scale_m")?, a.number("turns")?);
     let center = read_place(a, "center_m")?;
-    planned(a.py(), || sample_run(&Butterfly::new(scale_m, turns, center)?, &limits, dt_s))
+    along(a, 2, || Butterfly::new(scale_m, turns, center))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn spiral<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
-    let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
+#[pyfunction]
+pub(crate) fn spiral<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (pitch_m, turns) = (a.number("pitch_m")?, a.number("turns")?);
     let center = read_place(a, "center_m")?;
-    planned(a.py(), || sample_run(&Spiral::new(pitch_m, turns, center)?, &limits, dt_s))
+    along(a, 2, || Spiral::new(pitch_m, turns, center))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn raster<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (limits, start, dt_s) = (read_limits(a, 2)?, read_place(a, "start_m")?, a.number("dt_s")?);
-    let raster = RasterSection {
-        width_m: a.number("width_m")?,
-        pitch_m: a.number("pitch_m")?,
-        rows: a.whole("rows")?,
-        there_and_back: a.flag("there_and_back")?,
-    };
-    let feed_m_s = a.number("feed_m_s")?;
-    let setting = a.choice("setting", &SETTINGS)?;
+    let raster = read!(a, RasterSection:
+        [number => width_m, pitch_m]
+        [whole => rows]
+        [flag => there_and_back]
+    );
+    let (feed_m_s, setting) = (a.number("feed_m_s")?, a.choice("setting", &SETTINGS)?);
     planned(a.py(), || {
         let program = raster.segments(start, feed_m_s)?;
         sample_linear(&start, &program, &limits, setting, dt_s)
     })
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn gcode<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let text = a.get("text")?;
     let bytes = match text.extract::<&[u8]>() {
         Ok(bytes) => bytes,
@@ -313,8 +273,7 @@ pub(crate) fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
         exact_corners: blend_s.is_none(),
         block_delete: a.flag("block_delete")?,
     };
-    let program = read_gcode(bytes, &setting)
-        .map_err(|error| exceptions::TrajectoryError::new_err(error.to_string()))?;
+    let program = read_gcode(bytes, &setting).or_raise()?;
     let spec = PathSpec {
         start_m: start,
         segments: program.segments,
@@ -325,9 +284,8 @@ pub(crate) fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     planned(a.py(), || Ok((SampledMotion::of_path(&spec, &limits, dt_s)?, Vec::new())))
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn tracking_index(keywords: Option<Keywords<'_, '_>>) -> PyResult<(f64, f64)> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn tracking_index(a: Arguments<'_, '_>) -> PyResult<(f64, f64)> {
     let programmed = a.signal("programmed_m")?;
     let gains = (a.number("k_e")?, a.number("k_a")?);
     let index = TrackingIndex::of(

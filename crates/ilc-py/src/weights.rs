@@ -1,6 +1,5 @@
 //! Weights along the run: `ilc_rt.weights`, and their conversion for laws.
 
-use ilc_rt::learning::LearningError;
 use ilc_rt::learning::weights::{
     Contour, ContourTerms, Coupled, Formation, Gain, Objective, Pass, Schedule, Weight, band,
 };
@@ -9,14 +8,11 @@ use pyo3::prelude::*;
 
 use crate::answer::{Array, give_matrices, give_signal, give_vector};
 use crate::argument::{Matrix, misfit, read_array};
-use crate::arguments::{Arguments, Keywords};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
 use crate::whole::{each, number, pair, shown, whole};
-
-/// Largest number of entries of all matrices together: 0.8 GB.
-const VALUES_MAX: usize = 100_000_000;
 
 /// Reads a number, or one per sample.
 fn read_gain(a: Arguments<'_, '_>, name: &str, n_samples: usize) -> PyResult<Gain> {
@@ -71,21 +67,7 @@ pub(crate) fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<V
 
 /// Returns a weight to Python as one matrix per sample.
 fn give_blocks<'py>(py: Python<'py>, weight: &Weight, n_samples: usize, p: usize) -> Array<'py> {
-    let allowed = VALUES_MAX / (p * p).max(1);
-    if n_samples > allowed {
-        let (what, value) = ("n_samples", n_samples);
-        return Err(LearningError::TooMany { what, value, allowed }).or_raise();
-    }
-    let mut values = Vec::with_capacity(n_samples * p * p);
-    for k in 0..n_samples {
-        // Symmetric: column-major equals row-major.
-        values.extend_from_slice(weight.at(k, p).as_slice());
-    }
-    if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-        let (what, sample) = ("weight", at / (p * p));
-        let reason = "what it is made of is so large that it is not finite".to_owned();
-        return Err(LearningError::Weight { what, sample, reason }).or_raise();
-    }
+    let values = weight.values(n_samples, p).or_raise()?;
     Ok(give_matrices(py, (n_samples, p, p), |k, row, col| values[(k * p + row) * p + col]))
 }
 
@@ -93,11 +75,8 @@ fn give_blocks<'py>(py: Python<'py>, weight: &Weight, n_samples: usize, p: usize
 pub(crate) fn read_contour(a: Arguments<'_, '_>) -> PyResult<(Weight, usize, usize)> {
     let reference = a.signal("reference")?;
     let (n_samples, p) = (reference.n_samples, reference.n_channels);
-    let terms = ContourTerms {
-        q: a.weight("q", n_samples, p)?,
-        contour: read_gain(a, "contour", n_samples)?,
-        along: read_gain(a, "along", n_samples)?,
-    };
+    let (q, gain) = (a.weight("q", n_samples, p)?, |name| read_gain(a, name, n_samples));
+    let terms = ContourTerms { q, contour: gain("contour")?, along: gain("along")? };
     let axes = a.maybe_wholes("axes")?.unwrap_or_else(|| (0..p).collect());
     let weight = detached(a.py(), || Contour::of_axes(&reference.values, p, &axes)?.weight(&terms));
     Ok((weight.or_raise()?, n_samples, p))
@@ -135,29 +114,24 @@ fn read_formation(a: Arguments<'_, '_>, n_agents: usize, n_axes: usize) -> PyRes
     Formation::of_pairs(n_agents, n_axes, &pairs, &axes).or_raise()
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn contour_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn contour_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (weight, n_samples, p) = read_contour(a)?;
     give_blocks(a.py(), &weight, n_samples, p)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn coupled_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn coupled_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let matrices = read_matrices("coupling", &a.get("coupling")?)?;
     let (n_samples, p) = (matrices.len(), matrices[0].ncols());
-    let shares = Coupled {
-        sigma: read_gain(a, "sigma", n_samples)?,
-        gamma: read_gain(a, "gamma", n_samples)?,
-    };
+    let gain = |name| read_gain(a, name, n_samples);
+    let shares = Coupled { sigma: gain("sigma")?, gamma: gain("gamma")? };
     let weight = detached(a.py(), || shares.weight(n_samples, &matrices)).or_raise()?;
     give_blocks(a.py(), &weight, n_samples, p)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn schedule<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn schedule<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let n_samples = a.whole("n_samples")?;
     let steps = Schedule::new(&read_segments(&a.get("segments")?)?).or_raise()?;
     let schedule = match (a.maybe_number("bandwidth_hz")?, a.maybe_number("dt_s")?) {
@@ -185,18 +159,16 @@ fn read_segments(object: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
     })
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn formation_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn formation_weights<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (n_agents, n_axes) = (a.whole("n_agents")?, a.whole("n_axes")?);
     let n_samples = a.whole("n_samples")?;
     let weight = read_formation_weight(a, n_samples, n_agents, n_axes)?;
     give_blocks(a.py(), &weight, n_samples, n_agents * n_axes)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn formation_errors<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn formation_errors<'py>(a: Arguments<'_, 'py>) -> Array<'py> {
     let (e, n_agents) = (a.signal("e")?, a.whole("n_agents")?);
     if n_agents == 0 || !e.n_channels.is_multiple_of(n_agents) {
         let rule = format!("(n_samples, n_axes of {n_agents} agents)");
@@ -208,9 +180,8 @@ pub(crate) fn formation_errors<'py>(keywords: Option<Keywords<'_, 'py>>) -> Arra
     give_signal(a.py(), values, rows, false)
 }
 
-#[pyfunction(signature = (**keywords))]
-pub(crate) fn band_filter(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    let a = Arguments::of(keywords)?;
+#[pyfunction]
+pub(crate) fn band_filter(a: Arguments<'_, '_>) -> PyResult<PyStateSpace> {
     let pass = a.choice("passes", &[("low", Pass::Low), ("high", Pass::High)])?;
     let shape = (a.whole("order")?, a.number("cutoff_hz")?);
     let filter = band(pass, shape, a.number("dt_s")?, a.whole("n_channels")?);

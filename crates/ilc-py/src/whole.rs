@@ -5,39 +5,31 @@ use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyString};
 
-/// Largest count, index or order.
-const MAX: u64 = u32::MAX as u64;
-
-/// Reads an integer: Python's, NumPy's, or any object with `__index__`.
+/// Reads a count, an index or an order: Python's integers, NumPy's, or any object with `__index__`.
 ///
 /// # Errors
 /// - `TypeError` for a bool, a float, or any other non-integer.
 /// - `ValueError` for a number that is negative or too large.
 pub(crate) fn whole(name: &str, object: &Bound<'_, PyAny>) -> PyResult<usize> {
-    let number = integer(name, object, &format!("0 to {MAX}"))?;
-    match number.extract::<u64>().ok().filter(|value| *value <= MAX) {
-        #[expect(clippy::cast_possible_truncation, reason = "at most 32 bits")]
-        Some(value) => Ok(value as usize),
-        None => Err(out_of_range(name, &number, &format!("0 to {MAX}"))),
-    }
+    #[expect(clippy::cast_possible_truncation, reason = "at most 32 bits")]
+    within(name, object, u32::MAX.into()).map(|value| value as usize)
 }
 
-/// Returns the integer value of an object.
-fn integer<'py>(
-    name: &str,
-    object: &Bound<'py, PyAny>,
-    range: &str,
-) -> PyResult<Bound<'py, PyAny>> {
-    let refused = || refused(name, object, &format!("a whole number from {range}"));
+/// Reads the identity of a run.
+pub(crate) fn id(object: &Bound<'_, PyAny>) -> PyResult<i64> {
+    within("id", object, i64::MAX.unsigned_abs()).map(u64::cast_signed)
+}
+
+fn within(name: &str, object: &Bound<'_, PyAny>, max: u64) -> PyResult<u64> {
+    let needed = format!("a whole number from 0 to {max}");
+    let refused = || refused(name, object, &needed);
     if object.is_instance_of::<PyBool>() || object.is_instance_of::<PyFloat>() {
         return Err(refused());
     }
-    object.call_method0("__index__").map_err(|_| refused())
-}
-
-fn out_of_range(name: &str, number: &Bound<'_, PyAny>, range: &str) -> PyErr {
-    let text = shown(number);
-    PyValueError::new_err(format!("{name} = {text}; a whole number from {range} is needed"))
+    let number = object.call_method0("__index__").map_err(|_| refused())?;
+    number.extract().ok().filter(|value| *value <= max).ok_or_else(|| {
+        PyValueError::new_err(format!("{name} = {}; {needed} is needed", shown(&number)))
+    })
 }
 
 /// Returns the repr of a value, in one line of bounded length.
@@ -75,16 +67,6 @@ pub(crate) fn pair<'py>(
     })
 }
 
-/// Reads the identity of a run.
-pub(crate) fn id(object: &Bound<'_, PyAny>) -> PyResult<i64> {
-    let range = format!("0 to {}", i64::MAX);
-    let number = integer("id", object, &range)?;
-    match number.extract::<i64>() {
-        Ok(value) if value >= 0 => Ok(value),
-        _ => Err(out_of_range("id", &number, &range)),
-    }
-}
-
 /// Reads a number: Python's, NumPy's, or any object with `__float__`.
 ///
 /// # Errors
@@ -95,15 +77,28 @@ pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
         return Err(refused(name, object, "a number"));
     }
     object.extract::<f64>().map_err(|error| {
-        let py = object.py();
-        if error.is_instance_of::<PyOverflowError>(py) {
-            let text = shown(object);
-            return PyValueError::new_err(format!(
-                "{name} = {text}; only finite numbers are allowed"
-            ));
+        if !error.is_instance_of::<PyOverflowError>(object.py()) {
+            return refused(name, object, "a number");
         }
-        refused(name, object, "a number")
+        let line = format!("{name} = {}; only finite numbers are allowed", shown(object));
+        PyValueError::new_err(line)
     })
+}
+
+/// Refuses a number that is not finite.
+pub(crate) fn finite(name: &str, value: f64) -> PyResult<f64> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    Err(PyValueError::new_err(format!("{name} = {value}; only finite numbers are allowed")))
+}
+
+/// Refuses a number that is not finite and above 0.
+pub(crate) fn positive(name: &str, value: f64) -> PyResult<f64> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(PyValueError::new_err(format!("{name} = {value}; it must be finite and above 0")))
 }
 
 /// A number without a name of its own, within the range of a float.

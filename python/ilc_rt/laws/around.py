@@ -83,7 +83,7 @@ class Gate(_Around):
         growth: float = 1.5,
         patience: int = 2,
     ) -> Self:
-        return super().__new__(cls, "gate", **given(locals()))
+        return super().__new__(cls, "gate", given(locals()))
 
     @property
     def state(self) -> Literal["learning", "holding", "rolled_back"]:
@@ -159,7 +159,7 @@ class Ladder(_Around):
         lowest: float = 0.0625,
         highest: float = 1.5,
     ) -> Self:
-        return super().__new__(cls, "ladder", **given(locals()))
+        return super().__new__(cls, "ladder", given(locals()))
 
     @property
     def gain(self) -> float:
@@ -219,7 +219,7 @@ class Filtered(_Around):
     """
 
     def __new__(cls, law: AnyLaw, q_filter: QFilter = None) -> Self:
-        return super().__new__(cls, "filtered", **given(locals()))
+        return super().__new__(cls, "filtered", given(locals()))
 
 
 class ThroughJacobian(_Around):
@@ -266,7 +266,7 @@ class ThroughJacobian(_Around):
     """
 
     def __new__(cls, law: AnyLaw, jacobian: ArrayLike) -> Self:
-        return super().__new__(cls, "through_jacobian", law=law, jacobian=jacobian)
+        return super().__new__(cls, "through_jacobian", given(locals()))
 
     @property
     def n_joints(self) -> int:

@@ -121,16 +121,16 @@ class BasisFunctions(PythonLaw):
                 message = "parameters: only finite numbers are allowed"
                 raise ValueError(message)
             self._first = start.astype(np.float64)
-        self._law = Law(
-            "parametric",
-            model=model,
-            signals=self._psi.reshape(-1, n_samples).T,
-            q=weight("q", q, n_samples, model.n_outputs),
-            s=weight("s", s, n_samples, model.n_inputs),
-            r=weight("r", r, n_samples, model.n_inputs),
-            parameters=self._first.ravel(),
-            learn=bool(learn),
-        )
+        arguments = {
+            "model": model,
+            "signals": self._psi.reshape(-1, n_samples).T,
+            "q": weight("q", q, n_samples, model.n_outputs),
+            "s": weight("s", s, n_samples, model.n_inputs),
+            "r": weight("r", r, n_samples, model.n_inputs),
+            "parameters": self._first.ravel(),
+            "learn": bool(learn),
+        }
+        self._law = Law("parametric", arguments)
 
     @property
     def coefficients(self) -> dict[str, Array]:

@@ -118,7 +118,7 @@ class ConstrainedIlc(Law):
         output_bounds: Bounds = None,
         output_reference: ArrayLike | None = None,
     ) -> Self:
-        return super().__new__(cls, "constrained", **given(locals()))
+        return super().__new__(cls, "constrained", given(locals()))
 
     @property
     def n_samples(self) -> int:

@@ -63,7 +63,7 @@ class PdIlc(Law):
         q_filter: QFilter = None,
         lead_samples: int = 1,
     ) -> Self:
-        return super().__new__(cls, "pd", **given(locals()))
+        return super().__new__(cls, "pd", given(locals()))
 
 
 class ErrorFeedforwardIlc(Law):
@@ -116,7 +116,7 @@ class ErrorFeedforwardIlc(Law):
         lead_samples: int = 1,
         input_max: float | None = None,
     ) -> Self:
-        return super().__new__(cls, "error_feedforward", **given(locals()))
+        return super().__new__(cls, "error_feedforward", given(locals()))
 
     @property
     def n_limited(self) -> int:

@@ -63,7 +63,7 @@ class HigherOrderIlc(Law):
             message = f"weights = {weights!r}: a list of numbers is needed"
             raise TypeError(message)
         weights = [number("weights", weight, -1e3, 1e3) for weight in weights]
-        return super().__new__(cls, "higher_order", **given(locals()))
+        return super().__new__(cls, "higher_order", given(locals()))
 
     @property
     def law(self) -> Any:  # noqa: ANN401

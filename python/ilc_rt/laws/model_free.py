@@ -57,7 +57,7 @@ class ModelFreeIlc(Law):
     """
 
     def __new__(cls, gain: float | None = None, probe: float = 0.1) -> Self:
-        return super().__new__(cls, "model_free", **given(locals()))
+        return super().__new__(cls, "model_free", given(locals()))
 
     @property
     def gain(self) -> float | None:

@@ -63,7 +63,7 @@ class AdjointIlc(Law):
     def __new__(
         cls, model: Model, n_samples: int, gain: float | None = None, q_filter: QFilter = None
     ) -> Self:
-        return super().__new__(cls, "adjoint", **given(locals()))
+        return super().__new__(cls, "adjoint", given(locals()))
 
     @property
     def gain(self) -> float:
@@ -125,7 +125,7 @@ class ModelInverseIlc(Law):
     def __new__(
         cls, model: Model, n_samples: int, gain: float = 0.5, q_filter: QFilter = None
     ) -> Self:
-        return super().__new__(cls, "model_inverse", **given(locals()))
+        return super().__new__(cls, "model_inverse", given(locals()))
 
     @property
     def gain(self) -> float:

@@ -81,7 +81,7 @@ class NormOptimalIlc(Law):
         r: ArrayLike = 0.0,
         rate: float = 0.0,
     ) -> Self:
-        return super().__new__(cls, "norm_optimal", **given(locals()))
+        return super().__new__(cls, "norm_optimal", given(locals()))
 
     @classmethod
     def contour(
@@ -136,7 +136,7 @@ class NormOptimalIlc(Law):
         >>> law.update(np.zeros((100, 2)), np.ones((100, 2))).shape
         (100, 2)
         """
-        return super().__new__(cls, "contour", **given(locals()))
+        return super().__new__(cls, "contour", given(locals()))
 
     @classmethod
     def formation(
@@ -193,7 +193,7 @@ class NormOptimalIlc(Law):
         >>> law.update(np.zeros((100, 2)), np.ones((100, 2))).shape
         (100, 2)
         """
-        return super().__new__(cls, "formation", **given(locals()))
+        return super().__new__(cls, "formation", given(locals()))
 
     @classmethod
     def dynamic(
@@ -277,7 +277,7 @@ class NormOptimalIlc(Law):
         >>> law.update(np.zeros(100), np.ones(100)).shape
         (100,)
         """
-        return super().__new__(cls, "dynamic", **given(locals()))
+        return super().__new__(cls, "dynamic", given(locals()))
 
     @property
     def n_samples(self) -> int:

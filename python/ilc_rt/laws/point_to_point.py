@@ -82,4 +82,4 @@ class PointToPointIlc(Law):
         if not 1 <= len(points) <= POINTS_MAX or len(set(points)) < len(points):
             message = f"points: 1 to {POINTS_MAX} different samples are needed"
             raise LearningError(message)
-        return super().__new__(cls, "point_to_point", **given(locals()))
+        return super().__new__(cls, "point_to_point", given(locals()))

@@ -118,16 +118,7 @@ class RelevanceIlc(_Recalled):
                 line += "disturbance) is needed"
                 raise TypeError(line)
             weights = RelevanceWeights(*weights)
-        return super().__new__(
-            cls,
-            "relevance",
-            library=library,
-            core=core,
-            weights=weights,
-            top=top,
-            dt_s=dt_s,
-            cell=cell,
-        )
+        return super().__new__(cls, "relevance", given(locals()))
 
     def relevant(
         self, disturbance: ArrayLike | None = None
@@ -241,4 +232,4 @@ class FlexibleIlc(_Recalled):
         *,
         cell: str | None = None,
     ) -> Self:
-        return super().__new__(cls, "flexible", **given(locals()))
+        return super().__new__(cls, "flexible", given(locals()))

@@ -83,7 +83,7 @@ class StableInverseIlc(Law):
         zero_radius: float = 1.0,
         q_filter: QFilter = None,
     ) -> Self:
-        return super().__new__(cls, "stable_inverse", **given(locals()))
+        return super().__new__(cls, "stable_inverse", given(locals()))
 
     @property
     def zeros_outside(self) -> NDArray[np.complex128]:

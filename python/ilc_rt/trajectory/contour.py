@@ -43,7 +43,7 @@ class Line(_native.Line):
         from_m: ArrayLike,
         to_m: ArrayLike,
     ) -> Self:
-        return super().__new__(cls, from_m=from_m, to_m=to_m)
+        return super().__new__(cls, given(locals()))
 
 
 class Arc(_native.Arc):
@@ -81,7 +81,7 @@ class Arc(_native.Arc):
         sweep_rad: float,
         axis: ArrayLike | None = None,
     ) -> Self:
-        return super().__new__(cls, **given(locals()))
+        return super().__new__(cls, given(locals()))
 
 
 def contour_error(
@@ -122,7 +122,7 @@ def contour_error(
     >>> contour_error(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0.5, 0.25]]))
     array([0.25])
     """
-    return _native.contour_error(reference_m=reference_m, actual_m=actual_m, window=window)
+    return _native.contour_error(locals())
 
 
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]:

@@ -63,7 +63,7 @@ def spline(
     >>> path.n_axes
     2
     """
-    return Trajectory(**_native.spline(**locals()))
+    return Trajectory(**_native.spline(locals()))
 
 
 def butterfly(
@@ -123,7 +123,7 @@ def butterfly(
     >>> path.n_axes
     2
     """
-    return Trajectory(**_native.butterfly(**locals()))
+    return Trajectory(**_native.butterfly(locals()))
 
 
 def spiral(
@@ -187,4 +187,4 @@ def spiral(
     >>> bool(abs((path.position_m[-1] ** 2).sum() ** 0.5 - 0.012) < 1e-12)
     True
     """
-    return Trajectory(**_native.spiral(**locals()))
+    return Trajectory(**_native.spiral(locals()))

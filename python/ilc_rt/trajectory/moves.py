@@ -72,7 +72,7 @@ def jerk_limited(
     >>> round(float(move.t_s[-1]), 6)
     2.75
     """
-    return Trajectory(**_native.jerk_limited(**locals()))
+    return Trajectory(**_native.jerk_limited(locals()))
 
 
 def exponential_sigmoid(
@@ -147,7 +147,7 @@ def exponential_sigmoid(
     'start-up transition end'
     """
     given = {**locals(), "alpha_max": _by_place(alpha_max)}
-    return Trajectory(**_native.exponential_sigmoid(**given))
+    return Trajectory(**_native.exponential_sigmoid(given))
 
 
 def _by_place(alpha_max: object) -> tuple[float, ...] | None:
@@ -229,7 +229,7 @@ def modulated(
     >>> round(float(path.t_s[-1]), 6)
     5.0
     """
-    return Trajectory(**_native.modulated(**locals()))
+    return Trajectory(**_native.modulated(locals()))
 
 
 def sigmoid_pair(
@@ -309,4 +309,4 @@ def sigmoid_pair(
     >>> path.n_samples
     1401
     """
-    return Trajectory(**_native.sigmoid_pair(**locals()))
+    return Trajectory(**_native.sigmoid_pair(locals()))

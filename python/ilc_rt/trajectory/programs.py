@@ -76,7 +76,7 @@ def raster(
     >>> path.position_m[-1].tolist()
     [0.02, 0.01]
     """
-    return Trajectory(**_native.raster(**locals()))
+    return Trajectory(**_native.raster(locals()))
 
 
 def gcode(
@@ -141,4 +141,4 @@ def gcode(
     >>> path.position_m[-1].tolist()
     [0.0, 0.01]
     """
-    return Trajectory(**_native.gcode(**locals()))
+    return Trajectory(**_native.gcode(locals()))

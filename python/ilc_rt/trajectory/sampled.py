@@ -139,11 +139,4 @@ def tracking_index(
     if not isinstance(trajectory, Trajectory):
         message = f"trajectory is a {type(trajectory).__name__}; a Trajectory is needed"
         raise TypeError(message)
-    return _native.tracking_index(
-        dt_s=trajectory.dt_s,
-        position_m=trajectory.position_m,
-        acceleration_m_s2=trajectory.acceleration_m_s2,
-        programmed_m=trajectory.programmed_m,
-        k_e=k_e,
-        k_a=k_a,
-    )
+    return _native.tracking_index({**vars(trajectory), "k_e": k_e, "k_a": k_a})

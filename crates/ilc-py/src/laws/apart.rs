@@ -7,8 +7,9 @@ use ilc_rt::learning::Law;
 use pyo3::prelude::*;
 
 use super::{Call, Fits, PyLaw, Size};
+use crate::argument::Channels;
 use crate::arguments::Arguments;
-use crate::python_law::{Channels, Frame, PythonLaw};
+use crate::python_law::{Frame, PythonLaw};
 
 /// Returns a separate law for an analysis or a batch, for runs of this size: the object itself is not used,
 /// unless it is written in Python.

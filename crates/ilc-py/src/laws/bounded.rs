@@ -1,31 +1,36 @@
 //! Builder of constrained norm-optimal ILC: `constrained`.
 
 use ilc_rt::learning::law::constrained::{Bound as Limits, Bounds, Constrained, Limit};
-use ilc_rt::learning::law::norm_optimal::Cost;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
-use super::figure::Figure;
+use super::figure::readable;
 use super::kinds::modelled;
-use super::{Builder, Built, Call, Readable};
+use super::optimal::read_cost;
+use super::{Builder, Built, Call};
 use crate::argument::{Signal, misfit, read_numbers};
-use crate::detached::interruptible;
-use crate::error::OrRaise;
 
 /// The laws of this file.
 pub(super) const BUILDERS: &[Builder] = &[("constrained", constrained)];
+
+readable! {
+    Constrained as law =>
+    status: Text(Constrained::status(law).name()),
+    message: Text(Constrained::status(law).to_string()),
+    iterations: Count(law.iterations()),
+    gap: Number(law.gap());
+
+    fn is_long(&self) -> bool {
+        true
+    }
+}
 
 pub(super) fn constrained(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;
     let (model, n_samples, fits) = modelled(call)?;
     let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
-    let cost = Cost {
-        q: a.weight("q", n_samples, n_outputs)?,
-        s: a.weight("s", n_samples, n_inputs)?,
-        r: a.weight("r", n_samples, n_inputs)?,
-        rate: a.number("rate")?,
-    };
+    let cost = read_cost(a, a.weight("q", n_samples, n_outputs)?, n_samples, n_inputs)?;
     let limits = |name: &str, n_channels| {
         a.maybe(name, |name, given| read_limits(name, given, n_samples, n_channels))
     };
@@ -57,24 +62,7 @@ pub(super) fn constrained(call: &Call<'_, '_>) -> PyResult<Built> {
         },
         reference: reference.filter(|_| is_setpoint),
     };
-    let law = interruptible(call.py(), || Constrained::new(&model, n_samples, cost, bounds))?;
-    Ok(Built { law: Box::new(law.or_raise()?), fits })
-}
-
-impl Readable for Constrained {
-    fn figure(&self, name: &str) -> Option<Figure> {
-        Some(match name {
-            "status" => Figure::Text(Constrained::status(self).name().to_owned()),
-            "message" => Figure::Text(Constrained::status(self).to_string()),
-            "iterations" => Figure::Count(self.iterations()),
-            "gap" => Figure::Number(self.gap()),
-            _ => return None,
-        })
-    }
-
-    fn is_long(&self) -> bool {
-        true
-    }
+    call.built(fits, || Constrained::new(&model, n_samples, cost, bounds))
 }
 
 /// Reads a bound b, for -b to b, or a pair (lower, upper) in which `None` is infinite.
@@ -95,9 +83,8 @@ fn read_limits(
     }
     let length = object.len()?;
     if length != 2 {
-        return Err(PyValueError::new_err(format!(
-            "{name} has {length} sides; a pair (lower, upper) is needed"
-        )));
+        let line = format!("{name} has {length} sides; a pair (lower, upper) is needed");
+        return Err(PyValueError::new_err(line));
     }
     let side = |place: usize, unbounded: f64| -> PyResult<Limit> {
         let given = object.get_item(place)?;

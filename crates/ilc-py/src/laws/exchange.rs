@@ -26,7 +26,7 @@ const PIECE: usize = 2048;
 pub(super) struct Given<'py> {
     name: &'static str,
     array: PyReadonlyArrayDyn<'py, f64>,
-    layout: Layout,
+    pub(super) layout: Layout,
 }
 
 impl<'py> Given<'py> {
@@ -46,10 +46,6 @@ impl<'py> Given<'py> {
         Ok(given)
     }
 
-    pub(super) fn layout(&self) -> Layout {
-        self.layout
-    }
-
     pub(super) fn values(&self) -> PyResult<&[f64]> {
         Ok(self.array.as_slice()?)
     }
@@ -67,11 +63,6 @@ impl<'py> Given<'py> {
         }
         Ok(())
     }
-
-    /// Addresses of its numbers.
-    fn place(&self) -> Range<usize> {
-        place(&self.array)
-    }
 }
 
 /// Memory of the copies of input and error.
@@ -83,8 +74,8 @@ pub(super) struct Copies {
 
 /// The signals of one update.
 pub(super) struct Signals<'py> {
-    input: Given<'py>,
-    error: Given<'py>,
+    pub(super) input: Given<'py>,
+    pub(super) error: Given<'py>,
     /// Array of the next input; a new one if it is not given.
     out: Option<Out<'py>>,
 }
@@ -115,11 +106,6 @@ impl<'py> Signals<'py> {
             }
         }
         Ok(signals)
-    }
-
-    /// Layouts of input and error.
-    pub(super) fn layouts(&self) -> (Layout, Layout) {
-        (self.input.layout, self.error.layout)
     }
 
     fn is_long(&self) -> bool {
@@ -195,7 +181,7 @@ impl<'py> Out<'py> {
                 "out is a view with gaps, in another order or read-only; a writeable array in C order is needed",
             ));
         }
-        let (own, of_input, of_error) = (place(array), input.place(), error.place());
+        let (own, of_input, of_error) = (place(array), place(&input.array), place(&error.array));
         let meets = |other: &Range<usize>| own.start < other.end && other.start < own.end;
         let is_input = own == of_input;
         for (name, is_met) in [("u", !is_input && meets(&of_input)), ("e", meets(&of_error))] {

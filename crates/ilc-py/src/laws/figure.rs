@@ -8,29 +8,24 @@ use crate::answer::{Array, give_signal};
 
 /// A figure of a law: the value of a property of its Python class.
 pub(crate) enum Figure {
-    Absent,
-    Number(f64),
+    Number(Option<f64>),
     Count(usize),
     Text(String),
     /// An input of the law, time first.
-    Input(Vec<f64>),
-}
-
-impl From<Option<f64>> for Figure {
-    fn from(value: Option<f64>) -> Self {
-        value.map_or(Self::Absent, Self::Number)
-    }
+    Input(Option<Vec<f64>>),
 }
 
 impl Figure {
     /// Returns the figure to Python.
     pub(super) fn give(self, py: Python<'_>, n_inputs: usize, is_flat: bool) -> Array<'_> {
         Ok(match self {
-            Self::Absent => py.None().into_bound(py),
-            Self::Number(value) => value.into_pyobject(py)?.into_any(),
+            Self::Number(value) => value.into_pyobject(py)?,
             Self::Count(value) => value.into_pyobject(py)?.into_any(),
             Self::Text(value) => value.into_pyobject(py)?.into_any(),
-            Self::Input(values) => give_signal(py, values, n_inputs, is_flat && n_inputs == 1)?,
+            Self::Input(values) => {
+                let give = |values| give_signal(py, values, n_inputs, is_flat && n_inputs == 1);
+                values.map(give).transpose()?.into_pyobject(py)?
+            }
         })
     }
 }
@@ -58,3 +53,26 @@ pub(crate) trait Readable: Law {
         None
     }
 }
+
+/// Makes a law readable: its figures by name, each with its kind, and then other methods.
+///
+/// `readable! { Adjoint as law => gain: Number(law.gain()) }`
+macro_rules! readable {
+    ($($law:ty),+) => { $(impl $crate::laws::Readable for $law {})+ };
+    ($law:ty as $it:ident => $($name:ident: $kind:ident($value:expr)),+; $($others:tt)*) => {
+        impl $crate::laws::Readable for $law {
+            fn figure(&self, name: &str) -> Option<$crate::laws::figure::Figure> {
+                let $it = self;
+                match name {
+                    $(stringify!($name) => {
+                        Some($crate::laws::figure::Figure::$kind($value.into()))
+                    })+
+                    _ => None,
+                }
+            }
+
+            $($others)*
+        }
+    };
+}
+pub(super) use readable;

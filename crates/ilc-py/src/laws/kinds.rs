@@ -7,12 +7,11 @@ use ilc_rt::learning::law::pd::{Pd, PdGains};
 use ilc_rt::model::StateSpace;
 use pyo3::prelude::*;
 
-use super::figure::Figure;
-use super::{Builder, Built, Call, Fits, Readable, Size};
-use crate::detached::interruptible;
-use crate::error::OrRaise;
-use crate::python_law::Channels;
-use crate::signal::read_filter;
+use super::figure::readable;
+use super::{Builder, Built, Call, Fits, Size};
+use crate::argument::Channels;
+use crate::arguments::read;
+use crate::signal::given_filter;
 
 /// The laws of this file.
 pub(super) const BUILDERS: &[Builder] = &[
@@ -22,72 +21,49 @@ pub(super) const BUILDERS: &[Builder] = &[
     ("model_inverse", model_inverse),
 ];
 
-pub(super) fn pd(call: &Call<'_, '_>) -> PyResult<Built> {
-    let a = call.arguments;
-    let gains = PdGains {
-        kp: a.number("kp")?,
-        kd: a.number("kd")?,
-        lead_samples: a.whole("lead_samples")?,
-    };
-    let Size { n_samples, channels, .. } = call.size();
-    let law = Pd::new(gains, n_samples, channels.n_inputs, call.filter("q_filter")?).or_raise()?;
-    Ok(Built { law: Box::new(law), fits: Fits::Alike })
+readable! { Pd, ModelInverse }
+readable! { ErrorFeedforward as law => n_limited: Count(law.n_limited()); }
+readable! {
+    Adjoint as law => gain: Number(law.gain()), gain_limit: Number(law.gain_limit());
 }
 
-impl Readable for Pd {}
+pub(super) fn pd(call: &Call<'_, '_>) -> PyResult<Built> {
+    let gains = read!(call.arguments, PdGains: [number => kp, kd] [whole => lead_samples]);
+    let Size { n_samples, channels, .. } = call.size();
+    let filter = call.filter("q_filter")?;
+    Built::of(Fits::Alike, Pd::new(gains, n_samples, channels.n_inputs, filter))
+}
 
 pub(super) fn error_feedforward(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;
-    let rule = Feedforward {
-        gain_per_s: a.number("gain_per_s")?,
-        lead_samples: a.whole("lead_samples")?,
+    let rule = read!(a, Feedforward:
+        [number => gain_per_s]
+        [whole => lead_samples]
         input_max: a.maybe_number("input_max")?.unwrap_or(f64::INFINITY),
-    };
+    );
     let Size { n_samples, channels, .. } = call.size();
     let filter = call.filter("filter")?;
-    let law = ErrorFeedforward::new(rule, n_samples, channels.n_inputs, filter).or_raise()?;
-    Ok(Built { law: Box::new(law), fits: Fits::Alike })
-}
-
-impl Readable for ErrorFeedforward {
-    fn figure(&self, name: &str) -> Option<Figure> {
-        (name == "n_limited").then(|| Figure::Count(self.n_limited()))
-    }
+    Built::of(Fits::Alike, ErrorFeedforward::new(rule, n_samples, channels.n_inputs, filter))
 }
 
 /// Reads a model, and the runs of this length that a law with it accepts.
 pub(super) fn modelled(call: &Call<'_, '_>) -> PyResult<(StateSpace, usize, Fits)> {
     let model = call.arguments.model("model")?;
     let n_samples = call.arguments.whole("n_samples")?;
-    let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
-    Ok((model, n_samples, Fits::Fixed(n_samples, channels)))
+    let fits = Fits::Fixed(n_samples, Channels::of(&model));
+    Ok((model, n_samples, fits))
 }
 
 pub(super) fn adjoint(call: &Call<'_, '_>) -> PyResult<Built> {
     let (model, n_samples, fits) = modelled(call)?;
-    let gain = call.arguments.maybe_number("gain")?;
-    let q_filter = read_filter("q_filter", call.arguments.given("q_filter")?.as_ref())?;
-    let law =
-        interruptible(call.py(), || Adjoint::new(&model, n_samples, gain, q_filter))?.or_raise()?;
-    Ok(Built { law: Box::new(law), fits })
-}
-
-impl Readable for Adjoint {
-    fn figure(&self, name: &str) -> Option<Figure> {
-        match name {
-            "gain" => Some(Figure::Number(self.gain())),
-            "gain_limit" => Some(Figure::Number(self.gain_limit())),
-            _ => None,
-        }
-    }
+    let (gain, filter) =
+        (call.arguments.maybe_number("gain")?, given_filter(call.arguments, "q_filter")?);
+    call.built(fits, || Adjoint::new(&model, n_samples, gain, filter))
 }
 
 pub(super) fn model_inverse(call: &Call<'_, '_>) -> PyResult<Built> {
     let (model, n_samples, fits) = modelled(call)?;
-    let gain = call.arguments.number("gain")?;
-    let q_filter = read_filter("q_filter", call.arguments.given("q_filter")?.as_ref())?;
-    let law = interruptible(call.py(), || ModelInverse::new(&model, n_samples, gain, q_filter))?;
-    Ok(Built { law: Box::new(law.or_raise()?), fits })
+    let (gain, filter) =
+        (call.arguments.number("gain")?, given_filter(call.arguments, "q_filter")?);
+    call.built(fits, || ModelInverse::new(&model, n_samples, gain, filter))
 }
-
-impl Readable for ModelInverse {}

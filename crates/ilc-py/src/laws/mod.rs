@@ -16,20 +16,21 @@ mod research;
 
 use std::sync::Arc;
 
-use ilc_rt::learning::Law;
 use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answer::{Array, ByName};
-use crate::argument::{Layout, read_disturbance};
-use crate::arguments::{Arguments, Keywords};
+use crate::argument::{Channels, Layout, read_disturbance};
+use crate::arguments::Arguments;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
 use crate::made::reduce_kind;
-use crate::python_law::{Channels, Frame, PythonLaw};
-use crate::signal::read_filter;
+use crate::python_law::{Frame, PythonLaw};
+use crate::signal::given_filter;
 use crate::whole::whole;
 pub(crate) use apart::{apart, is_python, samples_of};
 use exchange::{Copies, Given, Signals};
@@ -102,7 +103,7 @@ impl<'py> Call<'_, 'py> {
 
     /// Returns the Q-filter of a law; a single sample is too short for any.
     fn filter(&self, name: &str) -> PyResult<QFilter> {
-        let filter = read_filter(name, self.arguments.given(name)?.as_ref())?;
+        let filter = given_filter(self.arguments, name)?;
         Ok(if self.size.is_some() { filter } else { QFilter::None })
     }
 
@@ -115,12 +116,28 @@ impl<'py> Call<'_, 'py> {
         let Size { n_samples, n_disturbances, .. } = self.size();
         apart(name, &object, n_samples, channels, n_disturbances)
     }
+
+    /// Builds a law while other Python threads run.
+    fn built<L: Readable + 'static>(
+        &self,
+        fits: Fits,
+        build: impl FnOnce() -> Result<L, LearningError> + Send,
+    ) -> PyResult<Built> {
+        Built::of(fits, interruptible(self.py(), build)?)
+    }
 }
 
 /// A law and the runs it accepts.
 struct Built {
     law: Box<dyn Readable>,
     fits: Fits,
+}
+
+impl Built {
+    /// Returns a new law, or raises its refusal.
+    fn of(fits: Fits, law: Result<impl Readable + 'static, LearningError>) -> PyResult<Self> {
+        Ok(Self { law: Box::new(law.or_raise()?), fits })
+    }
 }
 
 /// A learning law of the controller, of any kind.
@@ -148,16 +165,14 @@ struct State {
 #[pymethods]
 impl PyLaw {
     #[new]
-    #[pyo3(signature = (kind, /, **arguments))]
-    fn new(py: Python<'_>, kind: &str, arguments: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(kind: &str, arguments: Arguments<'_, '_>) -> PyResult<Self> {
         let mut builders = BUILDERS.into_iter().flatten().copied();
         let Some((kind, build)) = builders.find(|(name, _)| *name == kind) else {
             let kinds: Vec<&str> = BUILDERS.into_iter().flatten().map(|(name, _)| *name).collect();
             let line = format!("kind = '{kind}'; one of {} is needed", kinds.join(", "));
             return Err(PyValueError::new_err(line));
         };
-        let none = PyDict::new(py);
-        let kept = Arguments::new(arguments.unwrap_or(&none)).kept()?;
+        let kept = arguments.kept()?;
         let frame = Arc::new(Frame::default());
         let call = Call { arguments: Arguments::new(&kept), size: None, live: Some(&frame) };
         let Built { law, fits } = build(&call)?;
@@ -215,7 +230,7 @@ impl PyLaw {
     ) -> Array<'py> {
         let mut state = self.state.borrow(py)?;
         let signals = Signals::read(u, e, out, &mut state.copies)?;
-        let (u, e) = signals.layouts();
+        let (u, e) = (signals.input.layout, signals.error.layout);
         let told = if state.law.n_disturbances().is_some() {
             disturbance.map(|given| read_disturbance("disturbance", given)).transpose()?
         } else {
@@ -234,13 +249,10 @@ impl PyLaw {
         let State { law, copies, .. } = &mut *state;
         let learned = signals.exchange(py, law.as_mut(), copies, has_inner)?;
         drop(state);
-        match learned {
-            Ok(next) => Ok(next),
-            Err(error) => match self.frame.take_raised() {
-                Some(raised) => Err(raised),
-                None => Err(error).or_raise(),
-            },
-        }
+        learned.or_else(|error| match self.frame.take_raised() {
+            Some(raised) => Err(raised),
+            None => Err(error).or_raise(),
+        })
     }
 
     /// Announce a run before it begins: the first one, or one that is not learned from.
@@ -287,10 +299,8 @@ impl PyLaw {
         let found = state.law.figure(name);
         let n_inputs = state.size.unwrap_or(Size::ONE).channels.n_inputs;
         drop(state);
-        match found {
-            Some(found) => found.give(py, n_inputs, self.frame.is_flat()),
-            None => Err(PyAttributeError::new_err(format!("this law has no {name}"))),
-        }
+        let missing = || PyAttributeError::new_err(format!("this law has no {name}"));
+        found.ok_or_else(missing)?.give(py, n_inputs, self.frame.is_flat())
     }
 
     /// Add an earlier run, or one made elsewhere, to the memory.
@@ -305,7 +315,7 @@ impl PyLaw {
         let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
         let told = read_told("disturbance", disturbance)?;
         let mut state = self.state.borrow(py)?;
-        self.fit(py, &mut state, u.layout(), e.layout(), Some(&told))?;
+        self.fit(py, &mut state, u.layout, e.layout, Some(&told))?;
         let is_kept = state.law.recall(u.values()?, e.values()?, &told).or_raise()?;
         is_kept.then_some(()).ok_or_else(no_memory)
     }
@@ -376,11 +386,7 @@ impl PyLaw {
     ) -> PyResult<()> {
         let channels = Channels { n_inputs: u.n_channels, n_outputs: e.n_channels };
         match (self.fits, state.size) {
-            (Fits::Fixed(n_samples, channels), _) => {
-                u.require_exactly("u", n_samples, channels.n_inputs)?;
-                return e.require_exactly("e", n_samples, channels.n_outputs);
-            }
-            (Fits::First, Some(size)) => {
+            (Fits::Fixed(..) | Fits::First, Some(size)) => {
                 u.require_exactly("u", size.n_samples, size.channels.n_inputs)?;
                 return e.require_exactly("e", size.n_samples, size.channels.n_outputs);
             }
@@ -393,12 +399,13 @@ impl PyLaw {
                 e.require_samples("e", u.n_samples)?;
                 e.require_channels("e", u.n_channels)?;
             }
-            (Fits::Any, _) | (Fits::First, None) => e.require_samples("e", u.n_samples)?,
+            (Fits::Any, _) | (_, None) => e.require_samples("e", u.n_samples)?,
         }
         let told = disturbance.or(state.announced.last().map(Vec::as_slice));
         let n_disturbances = told.map_or(0, <[f64]>::len);
         let size = Size { n_samples: u.n_samples, channels, n_disturbances };
-        if self.fits != Fits::First && state.size == Some(Size { n_disturbances: 0, ..size }) {
+        let kept = if self.fits == Fits::First { size } else { Size { n_disturbances: 0, ..size } };
+        if state.size == Some(kept) {
             return Ok(());
         }
         self.frame.prepare(u.is_flat, None);
@@ -406,9 +413,7 @@ impl PyLaw {
         for disturbance in std::mem::take(&mut state.announced) {
             law.set_disturbance(&disturbance);
         }
-        state.law = law;
-        state.size =
-            Some(if self.fits == Fits::First { size } else { Size { n_disturbances: 0, ..size } });
+        (state.law, state.size) = (law, Some(kept));
         Ok(())
     }
 

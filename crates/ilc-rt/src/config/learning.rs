@@ -115,3 +115,13 @@ pub enum Measure {
     /// The tool centre point.
     Tcp,
 }
+
+impl Measure {
+    /// Returns its name in the cell description.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Encoder => "encoder",
+            Self::Tcp => "tcp",
+        }
+    }
+}

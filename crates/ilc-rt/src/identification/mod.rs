@@ -13,5 +13,5 @@ pub use band::{Band, BandSearch};
 pub use error::IdentificationError;
 pub use experiment::{Experiment, Signals};
 pub use identified::{Described, Form, Identified};
-pub use options::{ExperimentOptions, waveform, waveform_name};
+pub use options::{ExperimentOptions, WAVEFORMS, waveform_name};
 pub use search::identify;

@@ -113,15 +113,15 @@ impl ExperimentOptions {
     }
 }
 
-/// Names of the waveforms on a command line.
-const WAVEFORMS: [(&str, Waveform); 3] = [
+/// The waveforms with their names, on a command line and in Python.
+pub const WAVEFORMS: [(&str, Waveform); 3] = [
     ("sweep", Waveform::LogarithmicSweep),
     ("linear-sweep", Waveform::LinearSweep),
     ("multisine", Waveform::Multisine),
 ];
 
 /// Returns the waveform of a name.
-pub fn waveform(name: &str) -> Option<Waveform> {
+fn waveform(name: &str) -> Option<Waveform> {
     WAVEFORMS.iter().find(|(each, _)| *each == name).map(|(_, waveform)| *waveform)
 }
 

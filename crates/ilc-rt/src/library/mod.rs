@@ -4,11 +4,13 @@
 //! of several processes may share a file (write-ahead log); a killed process loses nothing it
 //! appended.
 
+mod earlier;
 mod elsewhere;
 mod error;
 mod figures;
 mod file;
 mod fitting;
+mod held;
 mod insert;
 mod listing;
 mod near;
@@ -26,10 +28,12 @@ mod tests;
 mod trim;
 mod upgrade;
 
+pub use earlier::Earlier;
 pub use elsewhere::{Elsewhere, ElsewhereError};
 pub use error::LibraryError;
 pub(crate) use file::IN_MEMORY;
 pub use fitting::Fitting;
+pub use held::Held;
 pub use listing::Page;
 pub use recall::{Near, Task};
 pub use row::Row;

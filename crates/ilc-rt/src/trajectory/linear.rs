@@ -9,7 +9,7 @@ use crate::interpolate::MAX_AXES;
 use crate::interpolate::line::Line;
 use crate::interpolate::{AxisLimits, MoveError, PathLimits};
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::motion::MotionState;
+use crate::trajectory::motion::{MotionState, SampledMotion};
 use crate::trajectory::path::{PathSegment, checked_lines};
 mod approach;
 mod axis_state;
@@ -179,6 +179,36 @@ impl Linear {
     /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.n_axes
+    }
+
+    /// Evaluates positions, velocities and accelerations at any times from the start.
+    ///
+    /// # Shapes
+    /// - each `n_times` x `n_axes`, time first
+    /// # Real Time
+    /// Cold: allocates.
+    pub fn tables_at(&self, times_s: &[f64]) -> [Vec<f64>; 3] {
+        let n_axes = self.n_axes();
+        let mut tables = [(); 3].map(|()| Vec::with_capacity(times_s.len() * n_axes));
+        for t_s in times_s {
+            let state = self.at(*t_s);
+            let values = [state.position_m, state.velocity_m_s, state.acceleration_m_s2];
+            for (table, values) in tables.iter_mut().zip(values) {
+                table.extend_from_slice(&values[..n_axes]);
+            }
+        }
+        tables
+    }
+
+    /// Samples the motion, see [`SampledMotion::sample`].
+    ///
+    /// # Real Time
+    /// Cold: allocates.
+    /// # Errors
+    /// Those of [`SampledMotion::sample`].
+    pub fn sampled(&self, dt_s: f64) -> Result<SampledMotion, TrajectoryError> {
+        let at = |t_s| (self.at(t_s), self.programmed_m(t_s));
+        SampledMotion::sample(self.duration_s(), dt_s, self.n_axes(), at)
     }
 
     /// Returns the state at a time from the start: that of the start before it and, at rest at the

@@ -15,6 +15,16 @@ pub enum Method {
     Structured,
 }
 
+impl Method {
+    /// Returns its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dense => "dense",
+            Self::Structured => "structured",
+        }
+    }
+}
+
 /// Convergence and performance of a law on a model, predicted.
 ///
 /// # Units

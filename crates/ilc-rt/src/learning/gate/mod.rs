@@ -17,6 +17,17 @@ pub enum GateState {
     RolledBack,
 }
 
+impl GateState {
+    /// Returns its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Learning => "learning",
+            Self::Holding => "holding",
+            Self::RolledBack => "rolled_back",
+        }
+    }
+}
+
 /// A wrapper that stops its law when the error is good enough, or before it diverges.
 ///
 /// - *Learning*, and the error is within the tolerance: *holding*, with the input unchanged.

@@ -4,6 +4,9 @@ use nalgebra::DMatrix;
 
 use crate::learning::{LearningError, Result};
 
+/// Largest number of entries of all matrices together: 0.8 GB.
+const VALUES_MAX: usize = 100_000_000;
+
 /// A symmetric, positive semidefinite weight of the channels of a signal, at each sample.
 ///
 /// # Shapes
@@ -52,6 +55,32 @@ impl Weight {
             Self::Scalar(weight) => *weight,
             Self::PerSample(weights) => weights[k],
         }
+    }
+
+    /// Returns the weight of a signal with `p` channels at every sample: symmetric blocks, time first.
+    ///
+    /// # Shapes
+    /// - `n_samples * p * p`
+    /// # Errors
+    /// - [`LearningError::TooMany`] beyond 0.8 GB; [`LearningError::Weight`] if a number is not finite.
+    /// # Panics
+    /// If the run is longer than the weight; [`Weight::check`] rules this out.
+    pub fn values(&self, n_samples: usize, p: usize) -> Result<Vec<f64>> {
+        let allowed = VALUES_MAX / (p * p).max(1);
+        if n_samples > allowed {
+            return Err(LearningError::TooMany { what: "n_samples", value: n_samples, allowed });
+        }
+        let mut values = Vec::with_capacity(n_samples * p * p);
+        for k in 0..n_samples {
+            // Symmetric: column-major equals row-major.
+            values.extend_from_slice(self.at(k, p).as_slice());
+        }
+        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+            let (what, sample) = ("weight", at / (p * p));
+            let reason = "what it is made of is so large that it is not finite".to_owned();
+            return Err(LearningError::Weight { what, sample, reason });
+        }
+        Ok(values)
     }
 
     /// Returns the block-diagonal weight of several signals side by side, each given with its number of channels.
@@ -180,6 +209,16 @@ fn check_block(block: &DMatrix<f64>, p: usize) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn values_are_the_blocks_of_all_samples() {
+        let weight = Weight::PerSample(vec![1.0, 4.0]);
+        assert_eq!(weight.values(2, 2).unwrap(), [1.0, 0.0, 0.0, 1.0, 4.0, 0.0, 0.0, 4.0]);
+        let many = Weight::Scalar(1.0).values(VALUES_MAX / 4 + 1, 2).unwrap_err();
+        assert!(matches!(many, LearningError::TooMany { allowed: 25_000_000, .. }), "{many}");
+        let large = Weight::PerSample(vec![1.0, f64::INFINITY]).values(2, 1).unwrap_err();
+        assert!(matches!(large, LearningError::Weight { sample: 1, .. }), "{large}");
+    }
 
     #[test]
     fn each_form_gives_its_matrix() {

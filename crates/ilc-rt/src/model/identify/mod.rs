@@ -24,7 +24,7 @@ pub use doubt::{Doubt, doubt};
 pub use excitation::{Excitation, ExcitationSignal, Waveform};
 pub use multisine::multisine;
 pub use rational::{RationalFit, fit_rational};
-pub use response::{FrequencyResponse, frequency_response};
+pub use response::{FrequencyResponse, ResponseError, frequency_response};
 pub use second_order::{Known, SecondOrder, SecondOrderFit, fit_second_order};
 pub use spectra::Averaging;
 pub use swept_sine::{Spacing, swept_sine};

@@ -1,6 +1,7 @@
 //! Estimate of the frequency response from a measurement, with its coherence.
 
 use nalgebra::Complex;
+use thiserror::Error;
 
 use super::spectra::{Averaging, Spectra};
 use crate::model::ModelError;
@@ -26,6 +27,55 @@ pub struct FrequencyResponse {
     pub coherence: Vec<f64>,
     /// Independent averages behind each estimate.
     pub n_averages: f64,
+}
+
+/// Refusal of numbers that are no measured response.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ResponseError {
+    /// Another number of entries than frequencies.
+    #[error("{what} has {found} entries; {needed}, one for each frequency, are needed")]
+    Length {
+        /// Name of the entries.
+        what: &'static str,
+        /// Entries given.
+        found: usize,
+        /// Number of frequencies.
+        needed: usize,
+    },
+    /// A coherence out of range.
+    #[error("coherence holds {value}; allowed 0 to 1")]
+    Coherence {
+        /// Value given.
+        value: f64,
+    },
+    /// Less than one average.
+    #[error("n_averages = {value}; at least 1 is needed")]
+    Averages {
+        /// Value given.
+        value: f64,
+    },
+}
+
+impl FrequencyResponse {
+    /// Refuses a response whose numbers do not belong together, e.g. one from elsewhere.
+    ///
+    /// # Errors
+    /// [`ResponseError`] for another number of entries than frequencies, a coherence beyond 0 to 1, or less than one
+    /// average.
+    pub fn checked(self) -> Result<Self, ResponseError> {
+        let needed = self.frequency_hz.len();
+        let lengths = [("response", self.response.len()), ("coherence", self.coherence.len())];
+        if let Some((what, found)) = lengths.into_iter().find(|(_, found)| *found != needed) {
+            return Err(ResponseError::Length { what, found, needed });
+        }
+        let is_out = |value: &f64| !(0.0..=1.0).contains(value);
+        if let Some(value) = self.coherence.iter().copied().find(is_out) {
+            return Err(ResponseError::Coherence { value });
+        }
+        let value = self.n_averages;
+        let is_enough = value.is_finite() && value >= 1.0;
+        if is_enough { Ok(self) } else { Err(ResponseError::Averages { value }) }
+    }
 }
 
 /// Estimates the frequency response from input and output.
@@ -232,6 +282,27 @@ impl FrequencyResponse {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_do_not_belong_together_are_refused() {
+        let response = |coherence: Vec<f64>, n_averages| FrequencyResponse {
+            frequency_hz: vec![1.0, 2.0],
+            response: vec![Complex::new(1.0, 0.0); 2],
+            coherence,
+            n_averages,
+        };
+        assert!(response(vec![0.0, 1.0], 1.0).checked().is_ok());
+        for (refused, sentence) in [
+            (response(vec![1.0], 1.0), "coherence has 1 entries; 2, one for each frequency,"),
+            (response(vec![0.5, 1.5], 1.0), "coherence holds 1.5; allowed 0 to 1"),
+            (response(vec![0.5, f64::NAN], 1.0), "coherence holds NaN"),
+            (response(vec![0.5, 0.5], 0.5), "n_averages = 0.5; at least 1"),
+            (response(vec![0.5, 0.5], f64::INFINITY), "n_averages = inf"),
+        ] {
+            let told = refused.checked().unwrap_err().to_string();
+            assert!(told.starts_with(sentence), "{told}");
+        }
+    }
 
     #[test]
     fn a_periodic_signal_gives_the_response_of_the_model_exactly() {

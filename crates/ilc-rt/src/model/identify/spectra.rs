@@ -25,6 +25,20 @@ pub enum Averaging {
     },
 }
 
+impl Averaging {
+    /// Returns Welch's method for signals of `n_samples`: by default eight segments' worth of samples, and half of a
+    /// segment shared with the next one.
+    pub fn welch(
+        n_samples: usize,
+        segment_samples: Option<usize>,
+        overlap_samples: Option<usize>,
+    ) -> Self {
+        let segment_samples = segment_samples.unwrap_or(n_samples / 8);
+        let overlap_samples = overlap_samples.unwrap_or(segment_samples / 2);
+        Self::Welch { segment_samples, overlap_samples }
+    }
+}
+
 /// Averages over all segments, for frequencies 0 to Nyquist.
 pub(super) struct Spectra {
     /// Samples in a segment.

@@ -75,6 +75,22 @@ impl<const N: usize> SampledPath<N> {
         Ok(Self { samples_m: samples_m.to_vec(), steps, index, piece_max_m })
     }
 
+    /// Returns the distance of each point to the whole path through the samples of a reference.
+    ///
+    /// # Shapes
+    /// - `reference_m`, `actual_m`: rows of `N` coordinates; returns one distance per row of `actual_m`, NaN for one
+    ///   that is not finite
+    /// # Errors
+    /// Those of [`SampledPath::new`].
+    pub fn contour_error_m(
+        reference_m: &[f64],
+        actual_m: &[f64],
+    ) -> Result<Vec<f64>, ContourError> {
+        let path = Self::new(reference_m.as_chunks().0)?;
+        let distance = |point| path.nearest(point).map_or(f64::NAN, |found| found.distance_m);
+        Ok(actual_m.as_chunks().0.iter().map(distance).collect())
+    }
+
     /// Returns the nearest point of the path; `None` for a point that is not finite.
     pub fn nearest(&self, point_m: &[f64; N]) -> Option<Nearest<N>> {
         if point_m.iter().any(|value| !value.is_finite()) {
@@ -134,6 +150,17 @@ fn distance_m<const N: usize>(one: &[f64; N], other: &[f64; N]) -> f64 {
 mod tests {
     use super::*;
     use crate::interpolate::random::Random;
+
+    #[test]
+    fn points_have_their_distances_to_the_whole_path() {
+        let reference_m = [0.0, 0.0, 1.0, 0.0];
+        let found =
+            SampledPath::<2>::contour_error_m(&reference_m, &[0.5, 0.25, 1.0, -3.0, f64::NAN, 0.0]);
+        let found = found.unwrap();
+        assert_eq!(found[..2], [0.25, 3.0]);
+        assert!(found[2].is_nan() && found.len() == 3);
+        assert!(SampledPath::<2>::contour_error_m(&[], &[0.0, 0.0]).is_err());
+    }
 
     fn exhaustive<const N: usize>(path: &SampledPath<N>, point_m: &[f64; N]) -> f64 {
         (0..path.samples_m.len() - 1)

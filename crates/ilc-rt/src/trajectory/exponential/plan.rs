@@ -9,7 +9,7 @@ use crate::interpolate::line::Line;
 use crate::interpolate::{AxisLimits, MoveError, PathLimits, Quantity};
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::grid::{CYCLE_S, n_ticks};
-use crate::trajectory::motion::MotionState;
+use crate::trajectory::motion::{MotionState, SampledMotion};
 use crate::trajectory::path::{PathSegment, checked_lines};
 
 /// Directions closer than this count as the same line.
@@ -132,6 +132,17 @@ impl ExponentialSigmoid {
     /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.n_axes
+    }
+
+    /// Samples the motion, see [`SampledMotion::sample`].
+    ///
+    /// # Real Time
+    /// Cold: allocates.
+    /// # Errors
+    /// Those of [`SampledMotion::sample`].
+    pub fn sampled(&self, dt_s: f64) -> Result<SampledMotion, TrajectoryError> {
+        let at = |t_s| (self.at(t_s), self.programmed_m(t_s));
+        SampledMotion::sample(self.duration_s(), dt_s, self.n_axes(), at)
     }
 
     /// Returns the state at a time from the start; at rest before it and after the end.

@@ -8,7 +8,6 @@ use crate::interpolate::Interpolator;
 use crate::schema::field_order;
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::exponential::{ExponentialSigmoid, ModulatedSegment};
-use crate::trajectory::motion::SampledMotion;
 
 /// `[program.modulated]`: an oscillation along the legs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +48,5 @@ fn plan(job: &Job) -> Result<Interpolator, ProgramError> {
     };
     let legs: Vec<ModulatedSegment> = program.segments.iter().map(leg).collect();
     let plan = ExponentialSigmoid::plan(&program.start_m, &legs, job.limits)?;
-    let at = |t_s: f64| (plan.at(t_s), plan.programmed_m(t_s));
-    job.play(&SampledMotion::sample(plan.duration_s(), job.cycle_s, plan.n_axes(), at)?)
+    job.play(&plan.sampled(job.cycle_s)?)
 }

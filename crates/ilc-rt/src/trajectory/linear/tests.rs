@@ -201,3 +201,17 @@ fn bad_programs_are_refused() {
     }
     assert!(Linear::plan(&[0.0], &[], &LIMITS, LinearSetting::StartOnTime).is_err());
 }
+
+#[test]
+fn tables_and_samples_are_those_of_the_motion() {
+    let program = PathSegment::lines(&[0.02, 0.05], 1, &[0.1, 0.2]);
+    assert_eq!(program[1], PathSegment::line(vec![0.05], 0.2));
+    let plan = Linear::plan(&[0.0], &program, &LIMITS, LinearSetting::StartOnTime).unwrap();
+    let motion = plan.sampled(0.002).unwrap();
+    let times_s: Vec<f64> = (0..motion.n_samples()).map(|k| k as f64 * 0.002).collect();
+    let [position_m, velocity_m_s, acceleration_m_s2] = plan.tables_at(&times_s);
+    assert_eq!(position_m, motion.position_m);
+    assert_eq!(velocity_m_s, motion.velocity_m_s);
+    assert_eq!(acceleration_m_s2, motion.acceleration_m_s2);
+    assert_eq!(position_m.last(), Some(&0.05));
+}

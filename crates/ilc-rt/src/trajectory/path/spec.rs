@@ -30,6 +30,15 @@ impl PathSegment {
     pub fn line(to_m: Vec<f64>, feed_m_s: f64) -> Self {
         Self { to_m, feed_m_s, arc: None, dwell_s: 0.0 }
     }
+
+    /// Returns straight moves through points, each with its feed.
+    ///
+    /// # Shapes
+    /// - `ends_m`: rows of `n_axes` coordinates; `feeds_m_s`: one per row
+    pub fn lines(ends_m: &[f64], n_axes: usize, feeds_m_s: &[f64]) -> Vec<Self> {
+        let moves = ends_m.chunks_exact(n_axes.max(1)).zip(feeds_m_s);
+        moves.map(|(to_m, feed_m_s)| Self::line(to_m.to_vec(), *feed_m_s)).collect()
+    }
 }
 
 /// An arc in the plane of two axes; the other axes move in proportion (helix).
