@@ -5,9 +5,10 @@
 
 use ilc_rt::learning::weights::Weight;
 use ilc_rt::model::StateSpace;
+use numpy::PyUntypedArray;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyString};
+use pyo3::types::{PyDict, PyFloat, PyList, PyString};
 use pyo3::{Borrowed, CastError};
 
 use crate::argument::{Matrix, Signal, misfit, read_array, read_pair, read_vector};
@@ -181,9 +182,12 @@ impl<'a, 'py> Arguments<'a, 'py> {
     pub(crate) fn kept(self) -> PyResult<Bound<'py, PyDict>> {
         let kept = PyDict::new(self.py());
         for (name, value) in self.0.iter() {
-            let shape = value.getattr_opt("shape")?;
-            let value = if shape.is_some_and(|shape| shape.len().is_ok_and(|axes| axes == 0)) {
+            let value = if value.is_exact_instance_of::<PyFloat>() || value.is_none() {
+                value
+            } else if value.getattr_opt("ndim")?.is_some_and(|n| n.eq(0).unwrap_or(false)) {
                 value.call_method0("item")?
+            } else if value.is_exact_instance_of::<PyUntypedArray>() {
+                value.call_method0("copy")?
             } else if value.is_instance_of::<PyList>() || value.hasattr("__array_interface__")? {
                 self.py().import("copy")?.getattr("deepcopy")?.call1((value,))?
             } else {

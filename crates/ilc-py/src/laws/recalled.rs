@@ -11,11 +11,10 @@ use pyo3::prelude::*;
 use super::figure::readable;
 use super::{Builder, Built, Call, Fits, Size};
 use crate::argument::{Channels, read_disturbance};
-use crate::arguments::{Arguments, read};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
-use crate::whole::whole;
+use crate::whole::{number, whole};
 
 /// The laws of this file.
 pub(super) const BUILDERS: &[Builder] = &[("relevance", relevance), ("flexible", flexible)];
@@ -96,16 +95,20 @@ fn earlier(call: &Call<'_, '_>) -> PyResult<Option<Earlier>> {
     detached(call.py(), find).or_raise().map(Some)
 }
 
-/// Reads an `ilc_rt.RelevanceWeights`.
+/// Reads any object with the attributes of `ilc_rt.RelevanceWeights`.
 fn read_weights(object: &Bound<'_, PyAny>) -> PyResult<RelevanceWeights> {
-    let attributes = object.getattr("__dict__")?;
-    let a = Arguments::new(attributes.cast()?);
-    let disturbance = read_disturbance("disturbance", &a.get("disturbance")?)?;
+    let part = |name: &str| number(name, &object.getattr(name)?);
+    let disturbance = read_disturbance("disturbance", &object.getattr("disturbance")?)?;
     let n = disturbance.len();
-    read!(a, RelevanceWeights:
-        [number => error, error_rate, epsilon, rate_filter_s, error_gain, input_gain]
-        disturbance: disturbance,
-    )
+    RelevanceWeights {
+        error: part("error")?,
+        error_rate: part("error_rate")?,
+        disturbance,
+        epsilon: part("epsilon")?,
+        rate_filter_s: part("rate_filter_s")?,
+        error_gain: part("error_gain")?,
+        input_gain: part("input_gain")?,
+    }
     .spread(n)
     .or_raise()
 }
