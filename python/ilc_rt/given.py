@@ -11,5 +11,7 @@ NOT_ARGUMENTS = ("self", "cls", "__class__")
 
 
 def given(local: dict[str, Any]) -> dict[str, Any]:
-    """Return the arguments of a method from its `locals()`: all but the object or the class."""
-    return {name: value for name, value in local.items() if name not in NOT_ARGUMENTS}
+    """Return the arguments of a method from its `locals()`, without the object or the class."""
+    for name in NOT_ARGUMENTS:
+        local.pop(name, None)
+    return local
