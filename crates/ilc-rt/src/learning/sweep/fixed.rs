@@ -7,27 +7,27 @@ use super::record::Sizes;
 use super::wide::{Instructions, Wide, Work};
 use super::{Channels, Run};
 
-/// Solves if the sizes are supported; otherwise leaves everything unchanged and returns `false`.
+/// Solves if the sizes and the processor are supported; otherwise leaves everything unchanged and returns `false`.
 pub(super) fn solve(gains: &Gains, channels: &Channels, kappa: &mut [f64], run: &mut Run) -> bool {
     let Sizes { n, m, targets, .. } = gains.sizes();
     macro_rules! choose {
         ($($m:literal: $($n:literal)*;)*) => {
             match (n, m, targets) {
                 $($(($n, $m, $m) => {
-                    Sweep::<$n, $m, $m, { $n + $m }> { gains, channels, kappa, run }.run();
+                    let sweep = Sweep::<$n, $m, $m, { $n + $m }> { gains, channels, kappa, run };
+                    Instructions::best().run_if_usual(sweep).is_some()
                 })*)*
-                _ => return false,
+                _ => false,
             }
         };
     }
     choose!(
         1: 1 2 3 4 5 6 7 8 9 10 11 12 16;
-        2: 1 2 3 4 5 6 7 8 9 10 11 12;
-        3: 1 2 3 4 5 6 7 8 9 10 11 12;
+        2: 1 2 3 4 5 6 7 8 10 12;
+        3: 1 2 3 4 5 6 7 8 9 12;
         4: 8 12;
         6: 12;
-    );
-    true
+    )
 }
 
 /// Sweeps over `N` states, `M` inputs and `P` targets; the columns of the gains have `R = N + M` rows.
@@ -36,12 +36,6 @@ struct Sweep<'a, 'r, const N: usize, const M: usize, const P: usize, const R: us
     channels: &'a Channels,
     kappa: &'a mut [f64],
     run: &'a mut Run<'r>,
-}
-
-impl<const N: usize, const M: usize, const P: usize, const R: usize> Sweep<'_, '_, N, M, P, R> {
-    fn run(self) {
-        Instructions::best().run(self);
-    }
 }
 
 impl<const N: usize, const M: usize, const P: usize, const R: usize> Work

@@ -74,6 +74,19 @@ impl Instructions {
         Self::Portable
     }
 
+    /// Runs the work with these instructions if they are those of most processors of this kind: work for which there
+    /// is a slower way, and that would be compiled twice otherwise.
+    pub(in crate::learning) fn run_if_usual<T: Work>(self, work: T) -> Option<T::Output> {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Portable => None,
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Portable => Some(work.with(Portable)),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx(simd) => Some(simd.vectorize(avx::Call(simd, work))),
+        }
+    }
+
     /// Runs the work with these instructions.
     pub(in crate::learning) fn run<T: Work>(self, work: T) -> T::Output {
         match self {
