@@ -82,7 +82,7 @@ def main() -> None:
         "",
         "## Plans of jerk-limited moves, from Python",
         "",
-        "`MovePlan` from motion to rest, and programs of many moves; as short as those of Ruckig.",
+        "`MovePlan` from motion to rest, and programs of many moves, none longer than by Ruckig.",
         "",
     ]
     axes = {n: progress(f"moves, {n} axes", moves.compare, n) for n in (1, 2, 6)}

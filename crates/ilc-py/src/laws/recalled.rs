@@ -76,7 +76,7 @@ pub(super) fn flexible(call: &Call<'_, '_>) -> PyResult<Built> {
     Built::of(Fits::First, Ok(law))
 }
 
-/// Finds the runs of a library that match the coming ones; there are none before the first run.
+/// Returns the runs of the library that have the size of the coming ones; `None` before the first run.
 fn earlier(call: &Call<'_, '_>) -> PyResult<Option<Earlier>> {
     let library = call.arguments.given("library")?;
     let task = Task { cell: call.arguments.maybe_text("cell")? };

@@ -94,10 +94,7 @@ impl Plan {
                 fingerprint: String::new(),
                 law: String::new(),
                 law_parameters: String::new(),
-                measure: match cell.learning.measure {
-                    Measure::Encoder => "encoder".to_owned(),
-                    Measure::Tcp => "tcp".to_owned(),
-                },
+                measure: cell.learning.measure.name().to_owned(),
                 program,
                 cycle_s: cell.cycle_s(),
                 n_axes: cell.n_axes(),
