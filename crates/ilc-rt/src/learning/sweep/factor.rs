@@ -5,7 +5,6 @@ use thiserror::Error;
 use super::cholesky::Pivots;
 use super::record::{Record, Sizes};
 use super::recursion::Recursion;
-use super::wide::LANES;
 use super::{Stage, Stages};
 
 /// The recursion has reached steady state once the closed-loop transition over the samples passed
@@ -73,9 +72,6 @@ pub struct Gains {
     product: Vec<f64>,
 }
 
-/// Numbers after the last gains, so that whole rows of them can be read from every place.
-pub(super) const BEYOND: usize = 4 * LANES;
-
 impl Gains {
     /// Runs the recursion from the end of the run to its start, in Joseph form.
     ///
@@ -125,8 +121,8 @@ impl Gains {
             product: room(),
         };
         if stages.constant().is_empty() {
-            gains.back.reserve_exact(n_samples * sizes.back() + BEYOND);
-            gains.fore.reserve_exact(n_samples * sizes.fore() + BEYOND);
+            gains.back.reserve_exact(n_samples * sizes.back());
+            gains.fore.reserve_exact(n_samples * sizes.fore());
         }
         gains.refactor(stages)?;
         Ok(gains)
@@ -197,9 +193,6 @@ impl Gains {
                 k = constant.start;
             }
         }
-        for gains in [&mut self.back, &mut self.fore] {
-            gains.resize(gains.len() + BEYOND, 0.0);
-        }
         Ok(())
     }
 
@@ -238,22 +231,31 @@ impl Gains {
         self.sizes
     }
 
-    /// Returns a set, counted from the end of the run, and the number of samples it serves.
-    pub(super) fn set(&self, place: usize) -> (usize, Record<'_>) {
+    /// Returns the gains of sample `k`.
+    pub(super) fn at(&self, k: usize) -> Record<'_> {
+        let from_end = self.n_samples - 1 - k;
+        let place = match from_end.checked_sub(self.n_tail) {
+            Some(later) if self.n_settled > 0 => {
+                self.n_tail + (later + 1).saturating_sub(self.n_settled)
+            }
+            _ => from_end,
+        };
         let (back, fore) = (self.sizes.back(), self.sizes.fore());
-        let count = if self.n_settled > 0 && place == self.n_tail { self.n_settled } else { 1 };
-        let record = Record {
+        Record {
             back: &self.back[place * back..(place + 1) * back],
             fore: &self.fore[place * fore..(place + 1) * fore],
-        };
-        (count, record)
+        }
     }
 
-    /// Returns a set as [`Gains::set`] does, each matrix with what follows it in memory: at least [`BEYOND`] numbers.
-    pub(super) fn open_set(&self, place: usize) -> (usize, Record<'_>) {
-        let (count, _) = self.set(place);
-        let (back, fore) = (place * self.sizes.back(), place * self.sizes.fore());
-        (count, Record { back: &self.back[back..], fore: &self.fore[fore..] })
+    /// Returns the gains in steady state, if it is reached.
+    pub(super) fn settled(&self) -> Option<Record<'_>> {
+        (self.n_settled > 0).then(|| self.at(self.n_samples - 1 - self.n_tail))
+    }
+
+    /// Returns true if the gains of sample `k` are those in steady state.
+    pub(super) fn is_settled(&self, k: usize) -> bool {
+        let first = self.n_samples - self.n_tail - self.n_settled;
+        (first..first + self.n_settled).contains(&k)
     }
 
     /// Goes back one sample, with the stage last read.

@@ -2,119 +2,238 @@
 
 #![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 
-use super::factor::Gains;
-use super::record::Sizes;
-use super::wide::{Instructions, Wide, Work};
+use std::ops::Range;
+
+use super::record::{Record, Sizes};
+use super::steps::{Steps, below, rows};
+use super::wide::{HALF, Instructions, Wide, Work};
 use super::{Channels, Run};
 
 /// Solves if the sizes and the processor are supported; otherwise leaves everything unchanged and returns `false`.
-pub(super) fn solve(gains: &Gains, channels: &Channels, kappa: &mut [f64], run: &mut Run) -> bool {
-    let Sizes { n, m, targets, .. } = gains.sizes();
+pub(super) fn solve(steps: &Steps, channels: &Channels, kappa: &mut [f64], run: &mut Run) -> bool {
+    let Sizes { n, m, targets, .. } = steps.sizes();
     macro_rules! choose {
         ($($m:literal: $($n:literal)*;)*) => {
             match (n, m, targets) {
                 $($(($n, $m, $m) => {
-                    let sweep = Sweep::<$n, $m, $m, { $n + $m }> { gains, channels, kappa, run };
+                    let sweep = Sweep::<$n, $m, { rows($n, $m) / HALF }> { steps, channels, kappa, run };
                     Instructions::best().run_if_usual(sweep).is_some()
                 })*)*
                 _ => false,
             }
         };
     }
+    // One, two, three, four and six axes by 8, 4, 3, 2 and 2 samples.
     choose!(
-        1: 1 2 3 4 5 6 7 8 9 10 11 12 16;
-        2: 1 2 3 4 5 6 7 8 10 12;
-        3: 1 2 3 4 5 6 7 8 9 12;
-        4: 8 12;
-        6: 12;
+        8: 1 2 3 4 5 6 7 8 9 10 11 12 16;
+        9: 3 4 5 6 7 8 9 12;
+        12: 12;
     )
 }
 
-/// Sweeps over `N` states, `M` inputs and `P` targets; the columns of the gains have `R = N + M` rows.
-struct Sweep<'a, 'r, const N: usize, const M: usize, const P: usize, const R: usize> {
-    gains: &'a Gains,
+/// Sweeps over `N` states, and `M` inputs and targets; the columns of the gains have `G` halves.
+struct Sweep<'a, 'r, const N: usize, const M: usize, const G: usize> {
+    steps: &'a Steps,
     channels: &'a Channels,
     kappa: &'a mut [f64],
     run: &'a mut Run<'r>,
 }
 
-impl<const N: usize, const M: usize, const P: usize, const R: usize> Work
-    for Sweep<'_, '_, N, M, P, R>
-{
+impl<const N: usize, const M: usize, const G: usize> Work for Sweep<'_, '_, N, M, G> {
     type Output = ();
 
     #[inline(always)]
-    fn with(self, _: impl Wide) {
-        let Self { gains, channels, kappa, run } = self;
-        let is_held = gains.sizes().held > 0;
-        let last = gains.n_samples().saturating_sub(1);
-        let inputs: [usize; M] = std::array::from_fn(|i| channels.inputs[i]);
-        let outputs: [usize; P] = std::array::from_fn(|i| channels.outputs[i]);
-        let shifts: [usize; P] = std::array::from_fn(|i| channels.shifts[i]);
-        let (kappa, _) = kappa.as_chunks_mut::<M>();
-
-        let mut state = [0.0; N];
-        let mut k = gains.n_samples();
-        for place in 0..gains.n_stored() {
-            let (count, at) = gains.set(place);
-            let Some((from_state, fresh)) = at.back.as_chunks::<R>().0.split_first_chunk::<N>()
-            else {
-                return;
-            };
-            let Some((from_error, from_input)) = fresh.split_first_chunk::<P>() else { return };
-            for _ in 0..count {
-                k -= 1;
-                let mut sum = [0.0; R];
-                for (i, column) in from_error.iter().enumerate() {
-                    // Beyond the end of the run the weight is zero: any finite value will do.
-                    let sample = (k + shifts[i]).min(last);
-                    add(&mut sum, column, run.error[sample * run.n_outputs + outputs[i]]);
-                }
-                if is_held {
-                    for (i, column) in from_input.iter().enumerate() {
-                        add(&mut sum, column, run.input[k * run.n_inputs + inputs[i]]);
-                    }
-                }
-                for (value, column) in state.iter().zip(from_state) {
-                    add(&mut sum, column, *value);
-                }
-                state = std::array::from_fn(|i| sum[i]);
-                kappa[k] = std::array::from_fn(|i| sum[N + i]);
-            }
+    fn with(self, wide: impl Wide) {
+        let Self { steps, channels, kappa, run } = self;
+        let signals = Signals::<M>::new(channels, steps, run);
+        let mut costate = [0.0; N];
+        let mut end = steps.n_steps();
+        for place in 0..steps.n_sets() {
+            let (count, gains) = steps.set(place);
+            let these = end - count..end;
+            end = these.start;
+            backward::<N, M, G>(wide, gains, &signals, run, &mut costate, these, kappa);
         }
-
         let mut state = [0.0; N];
-        for place in (0..gains.n_stored()).rev() {
-            let (count, at) = gains.set(place);
-            let (from_state, from_drive) = at.fore.split_at(N * R);
-            let Some(from_state) = from_state.as_chunks::<R>().0.first_chunk::<N>() else { return };
-            let Some(from_drive) = from_drive.as_chunks::<N>().0.first_chunk::<M>() else { return };
-            for _ in 0..count {
-                let drive = kappa[k];
-                let mut later = [0.0; N];
-                for (value, column) in drive.iter().zip(from_drive) {
-                    add(&mut later, column, *value);
-                }
-                let mut sum: [f64; R] =
-                    std::array::from_fn(|i| if i < N { later[i] } else { drive[i - N] });
-                for (value, column) in state.iter().zip(from_state) {
-                    add(&mut sum, column, *value);
-                }
-                state = std::array::from_fn(|i| sum[i]);
-                for i in 0..M {
-                    let index = k * run.n_inputs + inputs[i];
-                    run.next[index] = run.input[index] + sum[N + i];
-                }
-                k += 1;
+        for place in (0..steps.n_sets()).rev() {
+            let (count, gains) = steps.set(place);
+            let these = end..end + count;
+            end = these.end;
+            forward::<N, M, G>(wide, gains, &signals, run, &mut state, these, kappa);
+        }
+    }
+}
+
+/// Places of the `M` inputs and targets of a step in a run's signals.
+pub(super) struct Signals<const M: usize> {
+    is_held: bool,
+    inputs: Places<M>,
+    outputs: Places<M>,
+}
+
+/// Places in one signal.
+struct Places<const M: usize> {
+    /// Those of the first step.
+    first: [usize; M],
+    /// Numbers from step to step.
+    next: usize,
+    /// True if they follow each other.
+    are_adjacent: bool,
+}
+
+impl<const M: usize> Signals<M> {
+    #[inline(always)]
+    pub(super) fn new(channels: &Channels, steps: &Steps, run: &Run) -> Self {
+        let Channels { inputs, outputs, shifts } = channels;
+        let (samples, count) = (steps.samples(), M / steps.samples());
+        let (n_inputs, n_outputs) = (run.n_inputs, run.n_outputs);
+        let output = |i| (i / count + shifts[i % count]) * n_outputs + outputs[i % count];
+        Self {
+            is_held: steps.sizes().held > 0,
+            inputs: Places::new(|i| i / count * n_inputs + inputs[i % count], samples * n_inputs),
+            outputs: Places::new(output, samples * n_outputs),
+        }
+    }
+}
+
+impl<const M: usize> Places<M> {
+    fn new(place: impl Fn(usize) -> usize, next: usize) -> Self {
+        let first = std::array::from_fn(place);
+        Self { first, next, are_adjacent: first.windows(2).all(|pair| pair[0] + 1 == pair[1]) }
+    }
+
+    /// Returns the values of a step; zeros beyond the end of the run, where the weight is zero.
+    #[inline(always)]
+    fn load(&self, signal: &[f64], step: usize) -> [f64; M] {
+        let from = signal.get(step * self.next..).unwrap_or_default();
+        if self.are_adjacent
+            && let Some(values) = from.get(self.first[0]..).and_then(<[f64]>::first_chunk)
+        {
+            return *values;
+        }
+        let mut values = [0.0; M];
+        for (value, place) in values.iter_mut().zip(self.first) {
+            *value = from.get(place).copied().unwrap_or_default();
+        }
+        values
+    }
+
+    /// Writes the inputs of a step, as far as the run goes.
+    #[inline(always)]
+    fn store(&self, run: &mut Run, step: usize, change: [f64; M]) {
+        let (input, next) = (&run.input[step * self.next..], &mut run.next[step * self.next..]);
+        let first = self.first[0];
+        if self.are_adjacent
+            && let Some(input) = input.get(first..).and_then(<[f64]>::first_chunk::<M>)
+            && let Some(next) = next.get_mut(first..).and_then(<[f64]>::first_chunk_mut::<M>)
+        {
+            for ((next, input), change) in next.iter_mut().zip(input).zip(change) {
+                *next = input + change;
+            }
+            return;
+        }
+        for (place, change) in self.first.iter().zip(change) {
+            if let (Some(input), Some(next)) = (input.get(*place), next.get_mut(*place)) {
+                *next = input + change;
             }
         }
     }
 }
 
+/// Sweeps backward over some steps of the same gains, and writes their `kappa`.
+#[inline(always)]
+pub(super) fn backward<const N: usize, const M: usize, const G: usize>(
+    wide: impl Wide,
+    gains: Record,
+    signals: &Signals<M>,
+    run: &Run,
+    costate: &mut [f64; N],
+    steps: Range<usize>,
+    kappa: &mut [f64],
+) {
+    let columns = gains.back.as_chunks::<HALF>().0.as_chunks::<G>().0;
+    let Some((from_costate, fresh)) = columns.split_first_chunk::<N>() else { return };
+    let Some((from_error, from_input)) = fresh.split_first_chunk::<M>() else { return };
+    let kappa = kappa.as_chunks_mut::<HALF>().0;
+    let halves = G - below(N) / HALF;
+    for step in steps.rev() {
+        // The terms that do not wait for the previous step come first.
+        let mut sum = [wide.half(&[0.0; HALF]); G];
+        for (value, column) in signals.outputs.load(run.error, step).iter().zip(from_error) {
+            add(wide, &mut sum, *value, column);
+        }
+        if signals.is_held {
+            for (value, column) in signals.inputs.load(run.input, step).iter().zip(from_input) {
+                add(wide, &mut sum, *value, column);
+            }
+        }
+        for (value, column) in costate.iter().zip(from_costate) {
+            add(wide, &mut sum, *value, column);
+        }
+        read(wide, &sum, 0, costate);
+        for (kappa, half) in kappa[step * halves..].iter_mut().zip(&sum[G - halves..]) {
+            *kappa = wide.half_values(*half);
+        }
+    }
+}
+
+/// Sweeps forward over some steps of the same gains, and writes their inputs.
+#[inline(always)]
+pub(super) fn forward<const N: usize, const M: usize, const G: usize>(
+    wide: impl Wide,
+    gains: Record,
+    signals: &Signals<M>,
+    run: &mut Run,
+    state: &mut [f64; N],
+    steps: Range<usize>,
+    kappa: &[f64],
+) {
+    let columns = gains.fore.as_chunks::<HALF>().0.as_chunks::<G>().0;
+    let Some((from_state, from_kappa)) = columns.split_first_chunk::<N>() else { return };
+    let Some(from_kappa) = from_kappa.first_chunk::<M>() else { return };
+    let kappa = kappa.as_chunks::<HALF>().0;
+    let halves = G - below(N) / HALF;
+    for step in steps {
+        let kappa = &kappa[step * halves..][..halves];
+        let mut sum = [wide.half(&[0.0; HALF]); G];
+        for (half, kappa) in sum[G - halves..].iter_mut().zip(kappa) {
+            *half = wide.half(kappa);
+        }
+        for (value, column) in kappa.as_flattened().iter().zip(from_kappa) {
+            add(wide, &mut sum, *value, column);
+        }
+        for (value, column) in state.iter().zip(from_state) {
+            add(wide, &mut sum, *value, column);
+        }
+        read(wide, &sum, 0, state);
+        let mut change = [0.0; M];
+        read(wide, &sum, G - halves, &mut change);
+        signals.inputs.store(run, step, change);
+    }
+}
+
 /// Adds a multiple of a column.
 #[inline(always)]
-fn add<const R: usize>(sum: &mut [f64; R], column: &[f64; R], factor: f64) {
-    for (sum, value) in sum.iter_mut().zip(column) {
-        *sum += value * factor;
+fn add<W: Wide, const G: usize>(
+    wide: W,
+    sum: &mut [W::Half; G],
+    factor: f64,
+    column: &[[f64; HALF]; G],
+) {
+    for (sum, column) in sum.iter_mut().zip(column) {
+        *sum = wide.add_half(*sum, factor, wide.half(column));
+    }
+}
+
+/// Reads the rows from that half on.
+#[inline(always)]
+fn read<W: Wide, const G: usize, const C: usize>(
+    wide: W,
+    sum: &[W::Half; G],
+    first: usize,
+    to: &mut [f64; C],
+) {
+    for (to, half) in to.chunks_mut(HALF).zip(&sum[first..]) {
+        to.copy_from_slice(&wide.half_values(*half)[..to.len()]);
     }
 }

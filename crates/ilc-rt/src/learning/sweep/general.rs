@@ -1,6 +1,6 @@
 //! The two sweeps for any number of states, inputs and outputs.
 //!
-//! Each sample is a product of a matrix with a vector. Eight rows after the other stay in registers
+//! Each step is a product of a matrix with a vector. Eight rows after the other stay in registers
 //! while all columns are added to them, in the order of [`fixed`] and with the widest instructions of
 //! the processor, so that the numbers are the same.
 
@@ -8,35 +8,50 @@
 
 use super::factor::Gains;
 use super::record::Sizes;
+use super::steps::{Steps, below, rows};
 use super::wide::{Instructions, LANES, Wide, Work};
 use super::{Channels, Run, Sweep, fixed};
 
 /// The solver for coupled axes, and for time-varying gains.
 ///
 /// # Real Time
-/// Cold path. Allocates at creation, never in [`Sweep::solve`]; each sample costs about
-/// `(n + m)(n + p + m) + (n + m)(n + m)` multiply-adds.
+/// Cold path. Allocates at creation, never in [`Sweep::solve`]; each step of `S` samples costs about
+/// `(n + S m)(n + S p + S m) + (n + S m)(n + S m)` multiply-adds.
 #[derive(Debug, Clone)]
 pub struct General {
-    gains: Gains,
+    steps: Steps,
     channels: Channels,
-    /// One `kappa` per sample and input.
+    /// One `kappa` per step and input.
     kappa: Vec<f64>,
     work: Vec<f64>,
 }
 
 impl General {
     /// Creates the solver for the given channels.
-    pub fn new(gains: Gains, channels: Channels) -> Self {
-        let Sizes { n, m, targets, .. } = gains.sizes();
-        let kappa = vec![0.0; gains.n_samples() * m];
-        let work = vec![0.0; padded(n + m) + n + targets + m];
-        Self { gains, channels, kappa, work }
+    pub fn new(gains: &Gains, channels: Channels) -> Self {
+        // The longer the step, the shorter the wait and the longer the products, which are shortest
+        // where a step has as many inputs as states.
+        let (n, m) = (gains.n_states(), gains.n_inputs().max(1));
+        let inputs = if n > 16 { n } else { 8 };
+        Self::with_steps(Steps::new(gains, inputs.div_ceil(m).max(2)), channels)
+    }
+
+    /// Creates the solver that takes the samples one by one.
+    #[cfg(test)]
+    pub(super) fn by_sample(gains: &Gains, channels: Channels) -> Self {
+        Self::with_steps(Steps::new(gains, 1), channels)
+    }
+
+    fn with_steps(steps: Steps, channels: Channels) -> Self {
+        let Sizes { n, m, targets, .. } = steps.sizes();
+        let kappa = vec![0.0; steps.n_steps() * below(m)];
+        let work = vec![0.0; padded(rows(n, m)) + n + targets + m];
+        Self { steps, channels, kappa, work }
     }
 
     /// Creates the solver for signals that consist of this problem's channels only: every input,
     /// and a target for every output that has one, already paired.
-    pub fn alone(gains: Gains) -> Self {
+    pub fn alone(gains: &Gains) -> Self {
         let channels = Channels {
             inputs: (0..gains.n_inputs()).collect(),
             outputs: (0..gains.n_targets()).collect(),
@@ -45,73 +60,68 @@ impl General {
         Self::new(gains, channels)
     }
 
-    /// Returns the gains.
-    pub fn gains(&self) -> &Gains {
-        &self.gains
-    }
-
-    /// Returns the gains, for [`Gains::refactor`].
-    pub fn gains_mut(&mut self) -> &mut Gains {
-        &mut self.gains
-    }
-
     /// [`Sweep::solve`] for any sizes.
     #[inline(always)]
     fn any(&mut self, wide: impl Wide, run: &mut Run) {
-        let Self { gains, channels, kappa, work } = self;
-        let Sizes { n, m, targets: p, held, .. } = gains.sizes();
-        let rows = n + m;
-        let last = gains.n_samples().saturating_sub(1);
+        let Self { steps, channels, kappa, work } = self;
+        let Sizes { n, m, targets: p, held, .. } = steps.sizes();
+        let (rows, samples) = (rows(n, m), steps.samples());
         let (state, rest) = work.split_at_mut(n);
         let (sum, rest) = rest.split_at_mut(padded(rows));
         let (error, rest) = rest.split_at_mut(p);
         let input = &mut rest[..m];
-        let (inputs, outputs) = (&channels.inputs[..m], &channels.outputs[..p]);
-        let shifts = &channels.shifts[..p];
+        let (n_inputs, n_outputs) = (channels.inputs.len(), channels.outputs.len());
 
         state.fill(0.0);
-        let mut k = gains.n_samples();
-        for place in 0..gains.n_stored() {
-            let (count, at) = gains.open_set(place);
+        let mut step = steps.n_steps();
+        for place in 0..steps.n_sets() {
+            let (count, at) = steps.set(place);
             for _ in 0..count {
-                k -= 1;
-                for i in 0..p {
-                    // Beyond the end of the run the weight is zero: any finite value will do.
-                    let sample = (k + shifts[i]).min(last);
-                    error[i] = run.error[sample * run.n_outputs + outputs[i]];
+                step -= 1;
+                for (i, error) in error.iter_mut().enumerate() {
+                    let (sample, i) = (step * samples + i / n_outputs, i % n_outputs);
+                    let place = (sample + channels.shifts[i]) * run.n_outputs + channels.outputs[i];
+                    // Beyond the end of the run the weight is zero.
+                    *error = run.error.get(place).copied().unwrap_or_default();
                 }
                 sum.fill(0.0);
                 let fresh = &at.back[n * rows..];
                 add(wide, sum, fresh, rows, error);
                 if held > 0 {
-                    let values = &run.input[k * run.n_inputs..(k + 1) * run.n_inputs];
-                    for i in 0..m {
-                        input[i] = values[inputs[i]];
+                    for (i, input) in input.iter_mut().enumerate() {
+                        let (sample, i) = (step * samples + i / n_inputs, i % n_inputs);
+                        let place = sample * run.n_inputs + channels.inputs[i];
+                        *input = run.input.get(place).copied().unwrap_or_default();
                     }
                     add(wide, sum, &fresh[p * rows..], rows, input);
                 }
                 add(wide, sum, at.back, rows, state);
                 state.copy_from_slice(&sum[..n]);
-                kappa[k * m..(k + 1) * m].copy_from_slice(&sum[n..rows]);
+                kappa[step * below(m)..][..m].copy_from_slice(&sum[below(n)..][..m]);
             }
         }
 
         state.fill(0.0);
-        for place in (0..gains.n_stored()).rev() {
-            let (count, at) = gains.open_set(place);
+        for place in (0..steps.n_sets()).rev() {
+            let (count, at) = steps.set(place);
             for _ in 0..count {
-                let kappa = &kappa[k * m..(k + 1) * m];
-                let from_drive = &at.fore[n * rows..];
+                let kappa = &kappa[step * below(m)..][..m];
                 sum.fill(0.0);
-                add(wide, &mut sum[..padded(n)], from_drive, n, kappa);
-                sum[n..rows].copy_from_slice(kappa);
+                sum[below(n)..][..m].copy_from_slice(kappa);
+                add(wide, sum, &at.fore[n * rows..], rows, kappa);
                 add(wide, sum, at.fore, rows, state);
                 state.copy_from_slice(&sum[..n]);
-                for i in 0..m {
-                    let index = k * run.n_inputs + inputs[i];
-                    run.next[index] = run.input[index] + sum[n + i];
+                for (i, change) in sum[below(n)..][..m].iter().enumerate() {
+                    let (sample, i) = (step * samples + i / n_inputs, i % n_inputs);
+                    let place = sample * run.n_inputs + channels.inputs[i];
+                    // The last step may reach beyond the end of the run.
+                    if let (Some(input), Some(next)) =
+                        (run.input.get(place), run.next.get_mut(place))
+                    {
+                        *next = input + change;
+                    }
                 }
-                k += 1;
+                step += 1;
             }
         }
     }
@@ -122,7 +132,7 @@ fn padded(count: usize) -> usize {
     count.next_multiple_of(LANES)
 }
 
-/// Adds multiples of the columns of a matrix, which is followed by [`BEYOND`](super::factor::BEYOND) numbers, to
+/// Adds multiples of the columns of a matrix, which is followed by [`BEYOND`](super::steps::BEYOND) numbers, to
 /// a vector that is [`padded`]; its end holds any numbers afterwards.
 #[inline(always)]
 fn add(wide: impl Wide, sum: &mut [f64], matrix: &[f64], n_rows: usize, factors: &[f64]) {
@@ -178,7 +188,7 @@ impl Work for Solve<'_, '_> {
 
 impl Sweep for General {
     fn solve(&mut self, run: &mut Run) {
-        if !fixed::solve(&self.gains, &self.channels, &mut self.kappa, run) {
+        if !fixed::solve(&self.steps, &self.channels, &mut self.kappa, run) {
             Instructions::best().run(Solve(self, run));
         }
     }
@@ -242,7 +252,7 @@ mod tests {
             }
         }
         // Each with a cost of the input and without; the others, and an old processor, take the general way.
-        let all = 2 * (13 + 10 + 10 + 2 + 1);
+        let all = 2 * (13 + 12 + 8 + 12 + 1);
         assert!(known == all || known == 0, "{known} of {all}");
     }
 
@@ -258,24 +268,33 @@ mod tests {
             (0..(m + 1) * n_samples).map(|k| ((k * k + seed) as f64).sin()).collect()
         };
         let (input, error) = (wave(1), wave(2));
-        let mut general = General::new(gains.clone(), channels.clone());
-        let mut solve = |way: &mut dyn FnMut(&mut General, &mut Run) -> bool| {
+        let mut general = General::new(&gains, channels.clone());
+        let solve = |general: &mut General, way: &dyn Fn(&mut General, &mut Run) -> bool| {
             let mut next = vec![0.0; input.len()];
             let (input, error) = (&input[..], &error[..]);
             let mut run = Run { input, error, next: &mut next, n_inputs: m + 1, n_outputs: m + 1 };
-            way(&mut general, &mut run).then_some(next)
+            way(general, &mut run).then_some(next)
         };
-        let mut any = |how: Instructions| {
-            solve(&mut |general, run| {
+        let any = |general: &mut General, how: Instructions| {
+            solve(general, &|general, run| {
                 how.run(Solve(general, run));
                 true
             })
         };
-        let best = any(Instructions::best());
-        assert!(best.is_some() && best == any(Instructions::Portable), "{m} axes");
-        let fixed =
-            solve(&mut |general, run| fixed::solve(&gains, &channels, &mut general.kappa, run));
-        assert!(fixed.is_none() || fixed == best, "{} states, {m} axes", gains.n_states());
+        let best = any(&mut general, Instructions::best());
+        assert!(best.is_some() && best == any(&mut general, Instructions::Portable), "{m} axes");
+        let fixed = solve(&mut general, &|General { steps, kappa, channels, .. }, run| {
+            fixed::solve(steps, channels, kappa, run)
+        });
+        let told = format!("{} states, {m} axes", gains.n_states());
+        assert!(fixed.is_none() || fixed == best, "{told}");
+
+        let mut by_sample = General::by_sample(&gains, channels);
+        let by_sample = any(&mut by_sample, Instructions::Portable).unwrap();
+        let scale = by_sample.iter().fold(1.0_f64, |scale, value| scale.max(value.abs()));
+        for (k, (step, sample)) in best.unwrap().iter().zip(&by_sample).enumerate() {
+            assert!((step - sample).abs() <= 1e-13 * scale, "{told}, at {k}: {step} and {sample}");
+        }
         fixed.is_some()
     }
 }

@@ -96,7 +96,7 @@ impl Inverse {
         channels: Channels,
         free_samples: usize,
     ) -> Result<Self, FactorError> {
-        let solver = General::alone(Gains::new(&Solving(&*stages), free_samples)?);
+        let solver = General::alone(&Gains::new(&Solving(&*stages), free_samples)?);
         let stage = stages.stage(0);
         let (n, size) = (stage.n_states(), stages.n_samples() * stage.n_inputs());
         Ok(Self {

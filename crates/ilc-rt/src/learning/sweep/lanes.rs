@@ -9,31 +9,32 @@
 //! is a power of the transition, is added at the cut. The cuts depend on the gains and the length of
 //! the run alone, never on the processor.
 
-#![expect(
-    clippy::inline_always,
-    clippy::needless_range_loop,
-    reason = "compiled anew for the instructions of each processor, which closures are not"
-)]
+#![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 
-use super::Run;
-use super::single::Fixed;
+use super::lane_step::{Fade, Fixed, backward, forward};
+use super::tile::{Channel, Fetch, TILE};
 use super::wide::{LANES, Lanes, Wide};
+use super::{Channels, Run};
 
-/// Samples fetched at a time: one cache line per lane.
-const TILE: usize = LANES;
-/// Remainder of a state after the warm-up.
-const FORGOTTEN: f64 = 1e-18;
-/// Largest remainder of a state after a whole segment: rounding errors must fade from cut to cut.
-const FADED: f64 = 0.1;
 /// Samples per segment: with its `LANES` neighbours it fits the second-level cache.
 const STRETCH: usize = 2048;
 
-/// Position of the channel's samples in the signals.
+/// Position of a block's samples in the signals.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
-    pub(super) input: usize,
-    pub(super) output: usize,
-    pub(super) shift: usize,
+    input: usize,
+    output: usize,
+    shift: usize,
+    first: usize,
+}
+
+impl Place {
+    /// Returns the position of the block that begins at sample `first`.
+    #[inline(always)]
+    pub(super) fn new(channels: &Channels, first: usize) -> Self {
+        let Channels { inputs, outputs, shifts } = channels;
+        Self { input: inputs[0], output: outputs[0], shift: shifts[0], first }
+    }
 }
 
 /// The constant part of a run, cut into segments.
@@ -50,14 +51,14 @@ pub(super) struct Cut<const N: usize> {
 
 impl<const N: usize> Cut<N> {
     /// Returns the cut of `n_samples` samples, or `None` if it does not pay.
-    pub(super) fn new(gains: &Fixed<N>, n_samples: usize) -> Option<Self> {
+    pub(super) fn new<const S: usize>(gains: &Fixed<N, S>, n_samples: usize) -> Option<Self> {
         let shortest = n_samples / (LANES * TILE);
         if shortest == 0 {
             return None;
         }
         // Eight segments at a time are worth a warm-up of up to their own length.
-        let warm_up = match gains.fade(shortest * TILE) {
-            Fade::Forgotten(k) => k.max(1).div_ceil(TILE),
+        let warm_up = match gains.fade(shortest * TILE / S) {
+            Fade::Forgotten(steps) => (steps.max(1) * S).div_ceil(TILE),
             Fade::To(across) => return Some(Self::with(shortest, shortest, Some(Across(across)))),
             Fade::Never => return None,
         };
@@ -82,23 +83,23 @@ impl<const N: usize> Cut<N> {
         self.stretch * TILE * LANES
     }
 
-    /// Solves the block that begins at sample `first` and returns the state after it.
+    /// Solves a block and returns the state after it.
     ///
     /// `last` is the costate after the last block; `meanwhile` receives the costate at the start of
     /// this one and returns the state there.
     #[inline(always)]
-    pub(super) fn solve<const HELD: bool>(
+    pub(super) fn solve<const HELD: bool, const S: usize>(
         &mut self,
         wide: impl Wide,
-        gains: &Fixed<N>,
-        (place, first): (Place, usize),
+        gains: &Fixed<N, S>,
+        place: Place,
         run: &mut Run,
         last: Option<[f64; N]>,
         meanwhile: impl FnOnce(&mut Run, [f64; N]) -> [f64; N],
     ) -> [f64; N] {
         let Self { warm_up, stretch, across, kappa } = self;
         let length = *stretch * TILE;
-        let firsts: [usize; LANES] = std::array::from_fn(|lane| first + lane * length);
+        let firsts: [usize; LANES] = std::array::from_fn(|lane| place.first + lane * length);
         // Start of the warm-up segment of each lane; the very last one has none.
         let mut beyond = firsts.map(|first| first + length);
         if last.is_some() {
@@ -112,8 +113,8 @@ impl<const N: usize> Cut<N> {
         let mut costate = [zero; N];
         for tile in (0..*warm_up).rev() {
             let (error, input) = fetch.tile(wide, run, &beyond, tile);
-            for i in (0..TILE).rev() {
-                backward::<HELD, N, _>(wide, gains, &mut costate, input[i], error[i]);
+            for (error, input) in steps::<_, S>(&error).iter().zip(steps::<_, S>(&input)).rev() {
+                backward::<HELD, N, S, _>(wide, gains, &mut costate, input, error);
             }
         }
         let mut ends = values(wide, &costate);
@@ -126,9 +127,14 @@ impl<const N: usize> Cut<N> {
         let mut costate = rows(wide, &ends);
         for (tile, kappa) in kappa[1..].chunks_exact_mut(TILE).enumerate().rev() {
             let (error, input) = fetch.tile(wide, run, &firsts, tile);
-            for i in (0..TILE).rev() {
-                let row = backward::<HELD, N, _>(wide, gains, &mut costate, input[i], error[i]);
-                kappa[i] = Lanes(wide.values(row));
+            let kappa = kappa.as_chunks_mut::<S>().0.iter_mut();
+            for ((error, input), kappa) in
+                steps::<_, S>(&error).iter().zip(steps::<_, S>(&input)).zip(kappa).rev()
+            {
+                let rows = backward::<HELD, N, S, _>(wide, gains, &mut costate, input, error);
+                for s in 0..S {
+                    kappa[s] = Lanes(wide.values(rows[s]));
+                }
             }
         }
         let exact = meanwhile(run, lane(wide, &costate, 0));
@@ -136,12 +142,16 @@ impl<const N: usize> Cut<N> {
         // Each lane warms up over the end of the previous lane, one place earlier in memory; what
         // the first one reads there is ignored.
         let mut state = [zero; N];
-        for pair in kappa[length - *warm_up * TILE..].windows(2) {
-            let [before, now] = pair else { break };
-            let mut kappa = [0.0; LANES];
-            kappa[0] = before.0[LANES - 1];
-            kappa[1..].copy_from_slice(&now.0[..LANES - 1]);
-            forward(wide, gains, &mut state, wide.row(&kappa));
+        let begin = length - *warm_up * TILE;
+        for first in (begin..length).step_by(S) {
+            let mut rows = [zero; S];
+            for s in 0..S {
+                let mut moved = [0.0; LANES];
+                moved[0] = kappa[first + s].0[LANES - 1];
+                moved[1..].copy_from_slice(&kappa[first + s + 1].0[..LANES - 1]);
+                rows[s] = wide.row(&moved);
+            }
+            forward(wide, gains, &mut state, &rows);
         }
         let mut starts = values(wide, &state);
         replace(&mut starts, 0, exact);
@@ -151,8 +161,13 @@ impl<const N: usize> Cut<N> {
         let mut state = rows(wide, &starts);
         for (tile, kappa) in kappa[1..].chunks_exact(TILE).enumerate() {
             let mut change = [zero; TILE];
-            for i in 0..TILE {
-                change[i] = forward(wide, gains, &mut state, wide.row(&kappa[i].0));
+            let kappa = kappa.as_chunks::<S>().0;
+            for (change, kappa) in change.as_chunks_mut::<S>().0.iter_mut().zip(kappa) {
+                let mut rows = [zero; S];
+                for s in 0..S {
+                    rows[s] = wide.row(&kappa[s].0);
+                }
+                *change = forward(wide, gains, &mut state, &rows);
             }
             inputs.store(wide, run, &firsts, tile, change);
         }
@@ -227,184 +242,8 @@ fn replace<const N: usize>(values: &mut [[f64; LANES]; N], lane: usize, exact: [
     }
 }
 
-/// Inputs of the backward sweep.
-#[derive(Clone, Copy)]
-struct Fetch<const HELD: bool> {
-    errors: Channel,
-    inputs: Channel,
-    shift: usize,
-}
-
-impl<const HELD: bool> Fetch<HELD> {
-    /// Fetches a tile of error and input, sample by sample.
-    #[inline(always)]
-    fn tile<W: Wide>(
-        self,
-        wide: W,
-        run: &Run,
-        starts: &[usize; LANES],
-        tile: usize,
-    ) -> ([W::Row; TILE], [W::Row; TILE]) {
-        let error = self.errors.load(wide, run.error, starts, tile * TILE + self.shift);
-        let input =
-            if HELD { self.inputs.load(wide, run.input, starts, tile * TILE) } else { error };
-        (error, input)
-    }
-}
-
-/// One channel of a time-first signal.
-#[derive(Clone, Copy)]
-struct Channel {
-    offset: usize,
-    stride: usize,
-}
-
-impl Channel {
-    /// Fetches a tile per lane, `ahead` of its start; returns it sample by sample.
-    #[inline(always)]
-    fn load<W: Wide>(
-        self,
-        wide: W,
-        signal: &[f64],
-        starts: &[usize; LANES],
-        ahead: usize,
-    ) -> [W::Row; TILE] {
-        let mut rows = [wide.row(&[0.0; TILE]); LANES];
-        if self.stride == 1 {
-            for lane in 0..LANES {
-                let begin = starts[lane] + ahead + self.offset;
-                if let Some(values) = signal[begin..].first_chunk() {
-                    rows[lane] = wide.row(values);
-                }
-            }
-            return wide.transpose(rows);
-        }
-        for lane in 0..LANES {
-            let from = &signal[(starts[lane] + ahead) * self.stride + self.offset..];
-            let mut values = [0.0; TILE];
-            for (to, value) in values.iter_mut().zip(from.iter().step_by(self.stride)) {
-                *to = *value;
-            }
-            rows[lane] = wide.row(&values);
-        }
-        wide.transpose(rows)
-    }
-
-    /// Writes the input plus its change, given sample by sample.
-    #[inline(always)]
-    fn store<W: Wide>(
-        self,
-        wide: W,
-        run: &mut Run,
-        starts: &[usize; LANES],
-        tile: usize,
-        change: [W::Row; TILE],
-    ) {
-        let change = wide.transpose(change);
-        if self.stride == 1 {
-            for lane in 0..LANES {
-                let begin = starts[lane] + tile * TILE + self.offset;
-                let place = (run.input[begin..].first_chunk(), run.next[begin..].first_chunk_mut());
-                if let (Some(input), Some(next)) = place {
-                    *next = wide.values(wide.add(wide.row(input), change[lane]));
-                }
-            }
-            return;
-        }
-        for lane in 0..LANES {
-            let begin = (starts[lane] + tile * TILE) * self.stride + self.offset;
-            let inputs = run.input[begin..].iter().step_by(self.stride);
-            let nexts = run.next[begin..].iter_mut().step_by(self.stride);
-            for ((next, input), change) in nexts.zip(inputs).zip(wide.values(change[lane])) {
-                *next = input + change;
-            }
-        }
-    }
-}
-
+/// Returns the steps of a tile.
 #[inline(always)]
-fn backward<const HELD: bool, const N: usize, W: Wide>(
-    wide: W,
-    gains: &Fixed<N>,
-    costate: &mut [W::Row; N],
-    input: W::Row,
-    error: W::Row,
-) -> W::Row {
-    let mut kappa = wide.scale(gains.error, error);
-    let mut earlier = *costate;
-    for i in 0..N {
-        earlier[i] = wide.scale(gains.from_error[i], error);
-    }
-    if HELD {
-        kappa = wide.subtract(kappa, wide.scale(gains.input, input));
-        for (earlier, gain) in earlier.iter_mut().zip(gains.from_input) {
-            *earlier = wide.add(*earlier, wide.scale(gain, input));
-        }
-    }
-    for (j, value) in costate.iter().enumerate() {
-        kappa = wide.add(kappa, wide.scale(gains.costate[j], *value));
-        for (earlier, gains) in earlier.iter_mut().zip(&gains.transition) {
-            *earlier = wide.add(*earlier, wide.scale(gains[j], *value));
-        }
-    }
-    *costate = earlier;
-    kappa
-}
-
-#[inline(always)]
-fn forward<const N: usize, W: Wide>(
-    wide: W,
-    gains: &Fixed<N>,
-    state: &mut [W::Row; N],
-    kappa: W::Row,
-) -> W::Row {
-    let mut change = kappa;
-    let mut later = *state;
-    for i in 0..N {
-        later[i] = wide.scale(gains.b[i], kappa);
-    }
-    for ((value, column), feedback) in state.iter().zip(&gains.transition).zip(gains.feedback) {
-        change = wide.subtract(change, wide.scale(feedback, *value));
-        for (later, gain) in later.iter_mut().zip(column) {
-            *later = wide.add(*later, wide.scale(*gain, *value));
-        }
-    }
-    *state = later;
-    change
-}
-
-/// Remainder of a state after some time.
-enum Fade<const N: usize> {
-    /// Nothing in double precision, after so many samples.
-    Forgotten(usize),
-    /// This transition after the whole time.
-    To([[f64; N]; N]),
-    /// Too much of it.
-    Never,
-}
-
-impl<const N: usize> Fixed<N> {
-    /// Returns the remainder of a state after `longest` samples.
-    fn fade(&self, longest: usize) -> Fade<N> {
-        let mut power: [[f64; N]; N] =
-            std::array::from_fn(|col| std::array::from_fn(|row| f64::from(u8::from(row == col))));
-        // Relative to the largest so far, as the states may have different units.
-        let mut largest = 0.0_f64;
-        for k in 0..=longest {
-            let size = power.iter().flatten().fold(0.0_f64, |size, value| size.max(value.abs()));
-            largest = largest.max(size);
-            if size < FORGOTTEN * largest {
-                return Fade::Forgotten(k);
-            }
-            if k == longest {
-                return if size <= FADED * largest { Fade::To(power) } else { Fade::Never };
-            }
-            power = std::array::from_fn(|col| {
-                std::array::from_fn(|row| {
-                    (0..N).map(|i| self.transition[i][row] * power[col][i]).sum()
-                })
-            });
-        }
-        Fade::Never
-    }
+fn steps<R, const S: usize>(tile: &[R; TILE]) -> &[[R; S]] {
+    tile.as_chunks().0
 }

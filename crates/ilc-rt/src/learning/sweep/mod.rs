@@ -16,7 +16,9 @@
 //!
 //! Family: `factor`, `recursion` and `square_root` are one backward sweep in its two forms.
 //!
-//! Family: `lanes` and `single` are one forward sweep, over several problems or one.
+//! Family: `fixed`, `general`, `lanes` and `single` are the two sweeps, for sizes known at compile
+//! time, for any, and for one axis in several segments at a time; all take several samples at one
+//! step, which `steps` multiplies out.
 
 mod cholesky;
 mod factor;
@@ -24,6 +26,7 @@ mod fixed;
 mod fixed_step;
 mod general;
 mod inverse;
+mod lane_step;
 mod lanes;
 mod rate;
 mod record;
@@ -31,6 +34,8 @@ mod recursion;
 mod single;
 mod square_root;
 mod stage;
+mod steps;
+mod tile;
 pub(in crate::learning) mod wide;
 
 pub use factor::{FactorError, Form, Gains};
@@ -77,8 +82,8 @@ pub trait Sweep: Send + std::fmt::Debug {
 }
 
 /// Returns the fastest solver for the given channels.
-pub fn solver(gains: Gains, channels: Channels) -> Box<dyn Sweep> {
-    match single::single(&gains, &channels, Instructions::best()) {
+pub fn solver(gains: &Gains, channels: Channels) -> Box<dyn Sweep> {
+    match single::single(gains, &channels, Instructions::best()) {
         Some(solver) => solver,
         None => Box::new(General::new(gains, channels)),
     }

@@ -35,7 +35,12 @@ pub(super) struct Record<'a> {
 impl Sizes {
     /// Returns the length of the backward matrix.
     pub(super) fn back(&self) -> usize {
-        (self.n + self.m) * (self.n + self.targets + self.held)
+        (self.n + self.m) * self.columns()
+    }
+
+    /// Returns the number of columns of the backward matrix.
+    pub(super) fn columns(&self) -> usize {
+        self.n + self.targets + self.held
     }
 
     /// Returns the length of the forward matrix.

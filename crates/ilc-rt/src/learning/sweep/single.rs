@@ -1,16 +1,23 @@
-//! The two sweeps for one input and one output, with everything in registers.
+//! The two sweeps for one input and one output.
 
 #![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 
+use std::ops::Range;
+
 use super::factor::Gains;
+use super::fixed::{self, Signals};
+use super::lane_step::Fixed;
 use super::lanes::{Cut, Place};
-use super::record::Record;
-use super::wide::{Instructions, Wide, Work};
+use super::steps::{Steps, rows};
+use super::wide::{HALF, Instructions, Wide, Work};
 use super::{Channels, Run, Sweep};
 
 /// Largest number of states, including that of a rate penalty, that [`single`] supports.
 #[cfg(test)]
 const MAX_STATES: usize = 6;
+
+/// Samples per step of what is solved step by step.
+const STEP: usize = 4;
 
 /// Returns the solver for a single axis.
 ///
@@ -21,169 +28,151 @@ pub(super) fn single(
     channels: &Channels,
     how: Instructions,
 ) -> Option<Box<dyn Sweep>> {
-    let ([input], [output], [shift]) =
-        (&channels.inputs[..], &channels.outputs[..], &channels.shifts[..])
-    else {
+    if gains.n_inputs() != 1 || gains.n_targets() != 1 {
         return None;
-    };
-    let at = Place { input: *input, output: *output, shift: *shift };
-    Some(match gains.n_states() {
-        1 => Box::new(Single::<1>::new(gains, at, how)),
-        2 => Box::new(Single::<2>::new(gains, at, how)),
-        3 => Box::new(Single::<3>::new(gains, at, how)),
-        4 => Box::new(Single::<4>::new(gains, at, how)),
-        5 => Box::new(Single::<5>::new(gains, at, how)),
-        6 => Box::new(Single::<6>::new(gains, at, how)),
-        _ => return None,
-    })
-}
-
-/// The gains of one sample with sizes known at compile time.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Fixed<const N: usize> {
-    /// Column-major: column `j` is the effect of state `j`.
-    pub(super) transition: [[f64; N]; N],
-    pub(super) feedback: [f64; N],
-    pub(super) from_error: [f64; N],
-    pub(super) from_input: [f64; N],
-    pub(super) costate: [f64; N],
-    pub(super) b: [f64; N],
-    pub(super) error: f64,
-    pub(super) input: f64,
-}
-
-impl<const N: usize> Fixed<N> {
-    fn new(record: Record, is_held: bool) -> Self {
-        let rows = N + 1;
-        let fore = |row: usize, col: usize| record.fore[col * rows + row];
-        let back = |row: usize, col: usize| record.back[col * rows + row];
-        let held = |row: usize| if is_held { back(row, N + 1) } else { 0.0 };
-        Self {
-            transition: std::array::from_fn(|col| std::array::from_fn(|row| fore(row, col))),
-            feedback: std::array::from_fn(|col| -fore(N, col)),
-            from_error: std::array::from_fn(|row| back(row, N)),
-            from_input: std::array::from_fn(held),
-            costate: std::array::from_fn(|col| back(N, col)),
-            b: std::array::from_fn(|row| record.fore[rows * N + row]),
-            error: back(N, N),
-            input: -held(N),
-        }
     }
-
-    #[inline(always)]
-    fn backward<const HELD: bool>(&self, costate: &mut [f64; N], input: f64, error: f64) -> f64 {
-        let hold = |gain: f64| if HELD { gain * input } else { 0.0 };
-        let kappa = dot(self.error * error - hold(self.input), &self.costate, costate);
-        let earlier = std::array::from_fn(|i| {
-            // Terms that do not wait for the previous sample come first: they shorten the
-            // dependency chain.
-            let fresh = self.from_error[i] * error + hold(self.from_input[i]);
-            dot(fresh, &self.transition[i], costate)
-        });
-        *costate = earlier;
-        kappa
-    }
-
-    #[inline(always)]
-    fn forward(&self, state: &mut [f64; N], kappa: f64) -> f64 {
-        let change = kappa - dot(0.0, &self.feedback, state);
-        let mut next: [f64; N] = std::array::from_fn(|i| self.b[i] * kappa);
-        for (column, value) in self.transition.iter().zip(*state) {
-            for (entry, gain) in next.iter_mut().zip(column) {
-                *entry += gain * value;
+    macro_rules! choose {
+        ($($n:literal: $s:literal;)*) => {
+            match gains.n_states() {
+                $($n => Box::new(Single::<$n, { rows($n, STEP) / HALF }, $s>::new(gains, channels, how)),)*
+                _ => return None,
             }
-        }
-        *state = next;
-        change
+        };
     }
+    // The more states, the more a longer step saves; but it has to stay in registers.
+    Some(choose!(1: 2; 2: 2; 3: 2; 4: 4; 5: 4; 6: 4;))
 }
 
-#[inline(always)]
-fn dot<const N: usize>(mut sum: f64, left: &[f64; N], right: &[f64; N]) -> f64 {
-    for i in 0..N {
-        sum += left[i] * right[i];
-    }
-    sum
-}
-
-/// Gains in order of time, each with the number of samples it serves.
-type Sets<const N: usize> = Vec<(usize, Fixed<N>)>;
-
+/// The solver for `N` states, in parallel by `S` samples; the columns of the gains have `G` halves.
 #[derive(Debug)]
-struct Single<const N: usize> {
-    /// The samples before and after the segments.
-    before: Sets<N>,
-    cut: Option<(Fixed<N>, Cut<N>, usize)>,
-    after: Sets<N>,
-    n_before: usize,
-    n_samples: usize,
-    is_held: bool,
+struct Single<const N: usize, const G: usize, const S: usize> {
+    alone: Alone<N, G>,
+    parallel: Option<Parallel<N, S>>,
+    channels: Channels,
     instructions: Instructions,
-    place: Place,
-    /// `kappa` before and after.
+}
+
+/// The steps that are solved one after the other.
+#[derive(Debug)]
+struct Alone<const N: usize, const G: usize> {
+    steps: Steps,
+    /// Their number for each set, in the order of the recursion.
+    counts: Vec<usize>,
     kappa: Vec<f64>,
 }
 
-impl<const N: usize> Single<N> {
-    fn new(gains: &Gains, place: Place, instructions: Instructions) -> Self {
-        let (n_samples, is_held) = (gains.n_samples(), gains.sizes().held > 0);
-        let (mut before, mut after, mut cut) = (Vec::new(), Vec::new(), None);
-        for index in (0..gains.n_stored()).rev() {
-            let (count, record) = gains.set(index);
-            let fixed = Fixed::new(record, is_held);
-            match Cut::new(&fixed, count) {
-                // The samples left over from the segments come last, where the costate is exact.
-                Some(stretches) if count > 1 => {
-                    let n_blocks = count / stretches.block();
-                    before = std::mem::take(&mut after);
-                    after.push((count - n_blocks * stretches.block(), fixed));
-                    cut = Some((fixed, stretches, n_blocks));
-                }
-                _ => after.push((count, fixed)),
-            }
-        }
-        let n_before = before.len();
-        let n_after: usize = after.iter().map(|(count, _)| count).sum();
-        let kappa = vec![0.0; n_before + n_after];
-        Self { before, cut, after, n_before, n_samples, is_held, instructions, place, kappa }
+/// The steps of one set of gains that are solved in several segments at a time.
+#[derive(Debug)]
+struct Parallel<const N: usize, const S: usize> {
+    set: usize,
+    gains: Fixed<N, S>,
+    cut: Cut<N>,
+    n_blocks: usize,
+}
+
+impl<const N: usize, const G: usize, const S: usize> Single<N, G, S> {
+    fn new(gains: &Gains, channels: &Channels, instructions: Instructions) -> Self {
+        let steps = Steps::new(gains, STEP);
+        let mut counts: Vec<usize> = (0..steps.n_sets()).map(|set| steps.set(set).0).collect();
+        let settled = Steps::settled(gains, S);
+        let longest = (0..counts.len()).max_by_key(|set| counts[*set]);
+        let parallel = settled.zip(longest).and_then(|(settled, set)| {
+            let gains = Fixed::new(settled.set(0).1, settled.sizes());
+            let cut = Cut::new(&gains, counts[set] * STEP)?;
+            // The steps left over from the segments come last, where the costate is exact.
+            let n_blocks = counts[set] * STEP / cut.block();
+            counts[set] -= n_blocks * cut.block() / STEP;
+            Some(Parallel { set, gains, cut, n_blocks })
+        });
+        let kappa = vec![0.0; steps.n_steps() * STEP];
+        let (alone, channels) = (Alone { steps, counts, kappa }, channels.clone());
+        Self { alone, parallel, channels, instructions }
     }
 
     /// Solves with (`HELD`) or without a weight of the input.
     #[inline(always)]
     fn sweep<const HELD: bool>(&mut self, wide: impl Wide, run: &mut Run) {
-        let Self { before, cut, after, n_before, n_samples, place, kappa, .. } = self;
-        let (kappa_before, kappa_after) = kappa.split_at_mut(*n_before);
-        let first_after = *n_samples - kappa_after.len();
-        let costate = backward::<HELD, N>(after, *place, run, first_after, [0.0; N], kappa_after);
+        let Self { alone, parallel, channels, .. } = self;
+        let (n_steps, n_sets) = (alone.steps.n_steps(), alone.counts.len());
+        let signals = Signals::new(channels, &alone.steps, run);
+        let n_last = parallel.as_ref().map_or(n_sets, |parallel| parallel.set + 1);
+        let (costate, last) = alone.backward(wide, 0..n_last, n_steps, [0.0; N], &signals, run);
         let mut state = [0.0; N];
-        if let Some((gains, cut, n_blocks)) = cut {
+        if let Some(Parallel { gains, cut, n_blocks, .. }) = parallel {
+            let first = last - *n_blocks * cut.block() / STEP;
             for block in 0..*n_blocks {
-                let first = *n_before + block * cut.block();
                 let exact = (block + 1 == *n_blocks).then_some(costate);
-                let at = (*place, first);
-                state = cut.solve::<HELD>(wide, gains, at, run, exact, |run, costate| {
+                let at = Place::new(channels, first * STEP + block * cut.block());
+                state = cut.solve::<HELD, S>(wide, gains, at, run, exact, |run, costate| {
                     if block > 0 {
                         return state;
                     }
-                    backward::<HELD, N>(before, *place, run, 0, costate, kappa_before);
-                    forward(before, *place, run, 0, state, kappa_before)
+                    alone.backward(wide, n_last..n_sets, first, costate, &signals, run);
+                    alone.forward(wide, n_last..n_sets, 0, [0.0; N], &signals, run)
                 });
             }
         }
-        forward(after, *place, run, first_after, state, kappa_after);
+        alone.forward(wide, 0..n_last, last, state, &signals, run);
+    }
+}
+
+impl<const N: usize, const G: usize> Alone<N, G> {
+    /// Sweeps backward over some sets that end at step `end`, and returns the costate and the step
+    /// at their start.
+    #[inline(always)]
+    fn backward(
+        &mut self,
+        wide: impl Wide,
+        sets: Range<usize>,
+        mut end: usize,
+        mut costate: [f64; N],
+        signals: &Signals<STEP>,
+        run: &Run,
+    ) -> ([f64; N], usize) {
+        for set in sets {
+            let steps = end - self.counts[set]..end;
+            end = steps.start;
+            let (_, gains) = self.steps.set(set);
+            let kappa = &mut self.kappa;
+            fixed::backward::<N, STEP, G>(wide, gains, signals, run, &mut costate, steps, kappa);
+        }
+        (costate, end)
+    }
+
+    /// Sweeps forward over some sets that begin at step `begin`, and returns the state at their end.
+    #[inline(always)]
+    fn forward(
+        &self,
+        wide: impl Wide,
+        sets: Range<usize>,
+        mut begin: usize,
+        mut state: [f64; N],
+        signals: &Signals<STEP>,
+        run: &mut Run,
+    ) -> [f64; N] {
+        for set in sets.rev() {
+            let steps = begin..begin + self.counts[set];
+            begin = steps.end;
+            let (_, gains) = self.steps.set(set);
+            fixed::forward::<N, STEP, G>(wide, gains, signals, run, &mut state, steps, &self.kappa);
+        }
+        state
     }
 }
 
 /// A solver with the run to solve.
-struct Solve<'a, 'r, const N: usize>(&'a mut Single<N>, &'a mut Run<'r>);
+struct Solve<'a, 'r, const N: usize, const G: usize, const S: usize>(
+    &'a mut Single<N, G, S>,
+    &'a mut Run<'r>,
+);
 
-impl<const N: usize> Work for Solve<'_, '_, N> {
+impl<const N: usize, const G: usize, const S: usize> Work for Solve<'_, '_, N, G, S> {
     type Output = ();
 
     #[inline(always)]
     fn with(self, wide: impl Wide) {
         let Self(single, run) = self;
-        if single.is_held {
+        if single.alone.steps.sizes().held > 0 {
             single.sweep::<true>(wide, run);
         } else {
             single.sweep::<false>(wide, run);
@@ -191,64 +180,15 @@ impl<const N: usize> Work for Solve<'_, '_, N> {
     }
 }
 
-impl<const N: usize> Sweep for Single<N> {
+impl<const N: usize, const G: usize, const S: usize> Sweep for Single<N, G, S> {
     fn solve(&mut self, run: &mut Run) {
         self.instructions.run(Solve(self, run));
     }
 }
 
-/// Sweeps backward over the samples from `first` on and returns the costate at their start.
-#[inline(always)]
-fn backward<const HELD: bool, const N: usize>(
-    sets: &Sets<N>,
-    place: Place,
-    run: &Run,
-    first: usize,
-    mut costate: [f64; N],
-    kappa: &mut [f64],
-) -> [f64; N] {
-    let last = (run.error.len() / run.n_outputs).saturating_sub(1);
-    let mut k = kappa.len();
-    for (count, gains) in sets.iter().rev() {
-        let gains = *gains;
-        for _ in 0..*count {
-            k -= 1;
-            // Beyond the end of the run the weight is zero: any finite value will do.
-            let sample = (first + k + place.shift).min(last);
-            let error = run.error[sample * run.n_outputs + place.output];
-            let input =
-                if HELD { run.input[(first + k) * run.n_inputs + place.input] } else { 0.0 };
-            kappa[k] = gains.backward::<HELD>(&mut costate, input, error);
-        }
-    }
-    costate
-}
-
-/// Sweeps forward over the samples from `first` on and returns the state at their end.
-#[inline(always)]
-fn forward<const N: usize>(
-    sets: &Sets<N>,
-    place: Place,
-    run: &mut Run,
-    first: usize,
-    mut state: [f64; N],
-    kappa: &[f64],
-) -> [f64; N] {
-    let mut k = 0;
-    for (count, gains) in sets {
-        let gains = *gains;
-        for _ in 0..*count {
-            let index = (first + k) * run.n_inputs + place.input;
-            run.next[index] = run.input[index] + gains.forward(&mut state, kappa[k]);
-            k += 1;
-        }
-    }
-    state
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::{General, Stage, Stages};
+    use super::super::{General, Rate, Stage, Stages};
     use super::*;
     use nalgebra::DMatrix;
 
@@ -297,9 +237,13 @@ mod tests {
         let lengths: Vec<usize> = short.chain([5000, 40_000, 100_003]).collect();
         for n in 1..=MAX_STATES {
             for (&n_samples, s) in lengths.iter().zip([0.0, 0.2].into_iter().cycle()) {
-                let gains = Gains::new(&axis(n, s, n_samples), 0).unwrap();
-                for width in [1, 2] {
-                    agree(&gains, n_samples, width);
+                let axis = axis(n, s, n_samples);
+                let gains = Gains::new(&axis, 0).unwrap();
+                let rate = Rate { inner: axis, weight: 0.5 };
+                let rated = (n < MAX_STATES).then(|| Gains::new(&rate, 0).unwrap());
+                for (gains, width) in [Some(gains), rated].iter().flatten().zip([1, 2]) {
+                    agree(gains, n_samples, width);
+                    agree(gains, n_samples, 3 - width);
                 }
             }
         }
@@ -316,9 +260,10 @@ mod tests {
                 axis.stage.c = DMatrix::from_row_slice(1, 2, &[1.0, 0.0]);
                 (axis.stage.d[0], axis.stage.r[0]) = (0.0, r);
                 let gains = Gains::new(&axis, 0).unwrap();
-                let at = Place { input: 0, output: 0, shift: 1 };
-                let Single { cut, .. } = Single::<2>::new(&gains, at, Instructions::best());
-                let is_carried = cut.is_some_and(|(_, cut, _)| cut.carries());
+                let channels = Channels { inputs: vec![0], outputs: vec![0], shifts: vec![1] };
+                let how = Instructions::best();
+                let solver = Single::<2, { rows(2, STEP) / HALF }, 2>::new(&gains, &channels, how);
+                let is_carried = solver.parallel.is_some_and(|parallel| parallel.cut.carries());
                 for width in [1, 2] {
                     agree(&gains, n_samples, width);
                 }
@@ -349,7 +294,7 @@ mod tests {
         let quick = solve(quick.as_mut());
         let mut portable = single(gains, &channels, Instructions::Portable).unwrap();
         assert!(quick == solve(portable.as_mut()), "{told}");
-        let plain = solve(&mut General::new(gains.clone(), channels));
+        let plain = solve(&mut General::by_sample(gains, channels));
         let scale = plain.iter().fold(1.0_f64, |scale, value| scale.max(value.abs()));
         for (k, (quick, plain)) in quick.iter().zip(&plain).enumerate() {
             let told = format!("{told}, at {k}: {quick} and {plain}");

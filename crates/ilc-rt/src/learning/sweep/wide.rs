@@ -11,6 +11,8 @@
 
 /// Numbers per row.
 pub(in crate::learning) const LANES: usize = 8;
+/// Numbers per half of one.
+pub(in crate::learning) const HALF: usize = LANES / 2;
 
 /// Eight numbers in memory.
 #[derive(Debug, Clone, Copy, Default)]
@@ -22,6 +24,18 @@ pub(in crate::learning) trait Wide: Copy {
     /// Eight numbers in registers.
     type Row: Copy;
 
+    /// Half of them.
+    type Half: Copy;
+
+    /// Loads a half.
+    fn half(self, values: &[f64; HALF]) -> Self::Half;
+
+    /// Returns the numbers of a half.
+    fn half_values(self, half: Self::Half) -> [f64; HALF];
+
+    /// Returns `sum + factor half`.
+    fn add_half(self, sum: Self::Half, factor: f64, half: Self::Half) -> Self::Half;
+
     /// Loads a row.
     fn row(self, values: &[f64; LANES]) -> Self::Row;
 
@@ -30,9 +44,6 @@ pub(in crate::learning) trait Wide: Copy {
 
     /// Returns `left + right`.
     fn add(self, left: Self::Row, right: Self::Row) -> Self::Row;
-
-    /// Returns `left - right`.
-    fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row;
 
     /// Returns the products of the numbers, one by one.
     fn multiply(self, left: Self::Row, right: Self::Row) -> Self::Row;
@@ -103,6 +114,22 @@ pub(in crate::learning) struct Portable;
 
 impl Wide for Portable {
     type Row = [f64; LANES];
+    type Half = [f64; HALF];
+
+    #[inline(always)]
+    fn half(self, values: &[f64; HALF]) -> Self::Half {
+        *values
+    }
+
+    #[inline(always)]
+    fn half_values(self, half: Self::Half) -> [f64; HALF] {
+        half
+    }
+
+    #[inline(always)]
+    fn add_half(self, sum: Self::Half, factor: f64, half: Self::Half) -> Self::Half {
+        std::array::from_fn(|lane| sum[lane] + factor * half[lane])
+    }
 
     #[inline(always)]
     fn row(self, values: &[f64; LANES]) -> Self::Row {
@@ -117,11 +144,6 @@ impl Wide for Portable {
     #[inline(always)]
     fn add(self, left: Self::Row, right: Self::Row) -> Self::Row {
         std::array::from_fn(|lane| left[lane] + right[lane])
-    }
-
-    #[inline(always)]
-    fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row {
-        std::array::from_fn(|lane| left[lane] - right[lane])
     }
 
     #[inline(always)]
@@ -148,7 +170,7 @@ mod avx {
     use pulp::x86::V3;
     use pulp::{NullaryFnOnce, cast};
 
-    use super::{LANES, Wide, Work};
+    use super::{HALF, LANES, Wide, Work};
 
     /// Work with the proof that the processor has the instructions.
     pub(super) struct Call<T>(pub(super) V3, pub(super) T);
@@ -168,6 +190,23 @@ mod avx {
 
     impl Wide for V3 {
         type Row = [__m256d; 2];
+        type Half = __m256d;
+
+        #[inline(always)]
+        fn half(self, values: &[f64; HALF]) -> Self::Half {
+            cast(*values)
+        }
+
+        #[inline(always)]
+        fn half_values(self, half: Self::Half) -> [f64; HALF] {
+            cast(half)
+        }
+
+        #[inline(always)]
+        fn add_half(self, sum: Self::Half, factor: f64, half: Self::Half) -> Self::Half {
+            let simd = self.avx;
+            simd._mm256_add_pd(sum, simd._mm256_mul_pd(simd._mm256_set1_pd(factor), half))
+        }
 
         #[inline(always)]
         fn row(self, values: &[f64; LANES]) -> Self::Row {
@@ -183,12 +222,6 @@ mod avx {
         fn add(self, left: Self::Row, right: Self::Row) -> Self::Row {
             let simd = self.avx;
             [simd._mm256_add_pd(left[0], right[0]), simd._mm256_add_pd(left[1], right[1])]
-        }
-
-        #[inline(always)]
-        fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row {
-            let simd = self.avx;
-            [simd._mm256_sub_pd(left[0], right[0]), simd._mm256_sub_pd(left[1], right[1])]
         }
 
         #[inline(always)]
