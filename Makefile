@@ -17,7 +17,6 @@ SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o
 # Half of the Python tests wait for a process or for time to pass. A file with costly fixtures of its own
 # is kept together by the mark xdist_group.
 JOBS    := $(shell expr 2 \* $$(nproc))
-NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 # Every worker of pytest would compile every test anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -79,11 +78,9 @@ test: $(VENV)/.test $(VENV)/.docs ## Everything that can fail, on every transpor
 	+$(MAKE) --no-print-directory --jobs 3 --keep-going test-rust test-python vcan
 
 test-rust: ## Rust tests
-ifeq ($(NEXTEST),yes)
-	cargo nextest run --release --workspace --no-fail-fast
-else
-	cargo test --release --workspace --no-fail-fast
-endif
+	@if cargo nextest --version >/dev/null 2>&1; then set -x; \
+	  cargo nextest run --release --workspace --no-fail-fast; \
+	else set -x; cargo test --release --workspace --no-fail-fast; fi
 	cargo test --release --workspace --doc
 
 test-python: $(VENV)/.test $(VENV)/.docs ## Python tests

@@ -166,6 +166,7 @@ def test_the_command_of_the_document_watches_through_the_router(router: Router) 
     config.insert_json5("scouting/multicast/enabled", "false")
     with (
         zenoh.open(config) as cell,
+        cell.declare_publisher("ilc/gantry/iteration") as runs,
         cell.liveliness().declare_token("ilc/gantry/alive"),
         subprocess.Popen(
             [sys.executable, "-m", "ilc_rt.cli", "monitor", "gantry", "--no-scouting",
@@ -178,7 +179,11 @@ def test_the_command_of_the_document_watches_through_the_router(router: Router) 
         assert process.stdout.readline() == "gantry: controller alive\n"
         run = {"event": "iteration", "id": 1, "index": 0, "tracking_inf_m": 1e-3,
                "tracking_rms_m": 1e-3}  # fmt: skip
-        cell.put("ilc/gantry/iteration", json.dumps(run))
+        # The token may be routed back before the subscription has reached this session.
+        listener = runs.declare_matching_listener()
+        while not runs.matching_status.matching:
+            listener.recv()
+        runs.put(json.dumps(run))
         out, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert "1000" in out

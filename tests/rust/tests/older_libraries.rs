@@ -1,6 +1,6 @@
 //! Campaigns of libraries that older versions wrote go on, and what they learned is the same to the last
-//! bit: fingerprints and digests of the second run come from version 0.1 (`legacy_campaigns.json`). The digest of
-//! `norm_optimal` without weights over time is newer: its sums are in another order.
+//! bit: fingerprints and digests of the second run come from version 0.1 (`legacy_campaigns.json`). Those of
+//! `norm_optimal` are newer: its sums are in another order.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -29,6 +29,7 @@ fn cell(campaign: &Value, change: &dyn Fn(&mut Cell)) -> Cell {
 fn campaigns_of_version_0_1_go_on() {
     let campaigns: Vec<Value> = serde_json::from_str(OLDER).unwrap();
     assert_eq!(campaigns.len(), 8);
+    let mut changed = Vec::new();
     for campaign in &campaigns {
         let (whole, scratch) = (cell(campaign, &|_| {}), Scratch::new());
         let path = scratch.file("library.db");
@@ -42,7 +43,9 @@ fn campaigns_of_version_0_1_go_on() {
             .query_row("SELECT digest FROM iteration WHERE iteration = 1", [], |row| row.get(0))
             .unwrap();
         let learning = &campaign["learning"];
-        assert_eq!(digest, campaign["digest"].as_str().unwrap(), "{learning}");
+        if digest != campaign["digest"].as_str().unwrap() {
+            changed.push(format!("{learning}: {digest}"));
+        }
         let fingerprint = campaign["fingerprint"].as_str().unwrap();
         connection.execute("UPDATE iteration SET fingerprint = ?1", [fingerprint]).unwrap();
         drop(connection);
@@ -54,4 +57,5 @@ fn campaigns_of_version_0_1_go_on() {
         assert_eq!((outcome.status, outcome.runs.len()), (EndStatus::Completed, 3), "{learning}");
         assert_eq!(run(&whole, true, 4).unwrap().runs.len(), 4, "{learning}: once more");
     }
+    assert!(changed.is_empty(), "other digests:\n{}", changed.join("\n"));
 }

@@ -3,6 +3,11 @@
 //! In a null direction of the matrix the cost is flat; the solution's component there is set to
 //! zero: of all minimisers, the one that leaves that input unchanged.
 
+#![expect(
+    clippy::inline_always,
+    reason = "compiled anew for each size, and for the instructions of each processor"
+)]
+
 /// A pivot below this share of its diagonal entry is rounding noise.
 pub(super) const VANISHED: f64 = 1e-13;
 
@@ -37,7 +42,7 @@ impl Pivots {
 /// Replaces the lower triangle of `h` (m x m, column-major) by `L` with `h = L L'`.
 ///
 /// The column of a null direction is zero. Only the first `counted` pivots are reported.
-#[inline]
+#[inline(always)]
 pub(super) fn factorize(h: &mut [f64], m: usize, counted: usize) -> Pivots {
     let (mut pivots, mut others) = (Pivots::NONE, Pivots::NONE);
     for j in 0..m {
@@ -67,7 +72,7 @@ pub(super) fn factorize(h: &mut [f64], m: usize, counted: usize) -> Pivots {
 
 /// Replaces each diagonal entry by its reciprocal, or 0 in a null direction: the form that
 /// [`solve`] takes, because multiplication is much faster than division.
-#[inline]
+#[inline(always)]
 pub(super) fn invert_diagonal(lower: &mut [f64], m: usize) {
     for j in 0..m {
         let pivot = &mut lower[j * m + j];
@@ -77,7 +82,7 @@ pub(super) fn invert_diagonal(lower: &mut [f64], m: usize) {
 
 /// Replaces `x` by `H^-1 x`, zero in null directions; `lower` is column-major, its diagonal
 /// [inverted](invert_diagonal).
-#[inline]
+#[inline(always)]
 pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
     for row in 0..m {
         let mut value = x[row];
@@ -90,7 +95,7 @@ pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
 }
 
 /// Replaces `x` by `L'^-1 x`, zero in null directions.
-#[inline]
+#[inline(always)]
 pub(super) fn solve_transposed(lower: &[f64], m: usize, x: &mut [f64]) {
     for row in (0..m).rev() {
         let mut value = x[row];

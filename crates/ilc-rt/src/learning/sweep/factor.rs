@@ -12,6 +12,8 @@ use super::{Stage, Stages};
 const SETTLED_TRANSITION: f64 = 1e-9;
 /// ... and one more sample changes the cost by less than this share.
 const SETTLED_CHANGE: f64 = 1e-13;
+/// Sets of gains for which room is made at a time.
+const GROWTH: usize = 64;
 /// Growth of the steady-state closed loop over a run above which it is refused.
 const UNBOUNDED_GROWTH: f64 = 1e12;
 
@@ -55,7 +57,7 @@ pub struct Gains {
     free_samples: usize,
     sizes: Sizes,
     /// [`Record::back`] and [`Record::fore`] of each set, in the order of the recursion: those of
-    /// the last samples, the steady-state one, those of the first samples.
+    /// the last samples, the steady-state one, those of the first samples. There may be more room.
     back: Vec<f64>,
     fore: Vec<f64>,
     n_stored: usize,
@@ -121,8 +123,8 @@ impl Gains {
             product: room(),
         };
         if stages.constant().is_empty() {
-            gains.back.reserve_exact(n_samples * sizes.back());
-            gains.fore.reserve_exact(n_samples * sizes.fore());
+            gains.back.resize(n_samples * sizes.back(), 0.0);
+            gains.fore.resize(n_samples * sizes.fore(), 0.0);
         }
         gains.refactor(stages)?;
         Ok(gains)
@@ -139,8 +141,6 @@ impl Gains {
         let (n_samples, n) = (self.n_samples, self.sizes.n);
         let constant = stages.constant();
         let free_from = n_samples - self.free_samples.min(n_samples.saturating_sub(1));
-        self.back.clear();
-        self.fore.clear();
         (self.n_stored, self.n_tail, self.n_settled) = (0, 0, 0);
         self.pivots = Pivots::NONE;
         self.recursion.restart();
@@ -260,11 +260,17 @@ impl Gains {
 
     /// Goes back one sample, with the stage last read.
     fn step(&mut self) -> Pivots {
+        let (back, fore) = (self.sizes.back(), self.sizes.fore());
+        let (first_back, first_fore) = (self.n_stored * back, self.n_stored * fore);
         self.n_stored += 1;
-        let (back, fore) = (self.back.len(), self.fore.len());
-        self.back.resize(back + self.sizes.back(), 0.0);
-        self.fore.resize(fore + self.sizes.fore(), 0.0);
-        self.recursion.step(&self.stage, &mut self.back[back..], &mut self.fore[fore..])
+        for (gains, size) in [(&mut self.back, back), (&mut self.fore, fore)] {
+            if gains.len() < self.n_stored * size {
+                gains.resize((self.n_stored + GROWTH) * size, 0.0);
+            }
+        }
+        let back = &mut self.back[first_back..first_back + back];
+        let fore = &mut self.fore[first_fore..first_fore + fore];
+        self.recursion.step(&self.stage, back, fore)
     }
 
     /// `passed <- passed (A - B K)`.

@@ -11,7 +11,7 @@
 use super::Stage;
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
-use super::wide::{Instructions, Wide, Work};
+use super::wide::{HALF, Instructions, Wide, Work};
 
 /// Workspace of a step besides the gains; column-major.
 pub(super) struct Room<'a> {
@@ -25,11 +25,15 @@ pub(super) struct Room<'a> {
     pub(super) weighted_c: &'a mut [f64],
 }
 
+/// Pivots, Cholesky factor of `H` and `K` (m x n) that another form has found, with its cost.
+pub(super) type Given<'a> = Option<(Pivots, &'a [f64], &'a [f64])>;
+
 /// Takes the step if the sizes are supported; otherwise leaves everything unchanged.
 pub(super) fn step(
     how: Instructions,
     sizes: Sizes,
     stage: &Stage,
+    given: Given,
     room: Room,
     back: &mut [f64],
     fore: &mut [f64],
@@ -37,7 +41,7 @@ pub(super) fn step(
     macro_rules! choose {
         ($(($n:literal, $m:literal, $p:literal))*) => {
             match (sizes.n, sizes.m, sizes.p) {
-                $(($n, $m, $p) => Some(widest($m, how).run(Step::<$n, $m, $p> { sizes, stage, room, back, fore })),)*
+                $(($n, $m, $p) => Some(widest($m, how).run(Step::<$n, $m, $p> { sizes, stage, given, room, back, fore })),)*
                 _ => None,
             }
         };
@@ -59,6 +63,7 @@ fn widest(n_inputs: usize, best: Instructions) -> Instructions {
 struct Step<'a, const N: usize, const M: usize, const P: usize> {
     sizes: Sizes,
     stage: &'a Stage,
+    given: Given<'a>,
     room: Room<'a>,
     back: &'a mut [f64],
     fore: &'a mut [f64],
@@ -68,15 +73,18 @@ impl<const N: usize, const M: usize, const P: usize> Work for Step<'_, N, M, P> 
     type Output = Pivots;
 
     #[inline(always)]
-    fn with(self, _: impl Wide) -> Pivots {
-        sized::<N, M, P>(self.sizes, self.stage, self.room, self.back, self.fore)
+    fn with(self, wide: impl Wide) -> Pivots {
+        let Self { sizes, stage, given, room, back, fore } = self;
+        sized::<N, M, P>(wide, sizes, stage, given, room, back, fore)
     }
 }
 
 #[inline(always)]
 fn sized<const N: usize, const M: usize, const P: usize>(
+    wide: impl Wide,
     Sizes { targets, held, .. }: Sizes,
     stage: &Stage,
+    given: Given,
     room: Room,
     back: &mut [f64],
     fore: &mut [f64],
@@ -92,36 +100,48 @@ fn sized<const N: usize, const M: usize, const P: usize>(
     let effort: Columns<M, M> =
         std::array::from_fn(|col| std::array::from_fn(|row| s[col][row] + r[col][row]));
     let (bt, dt): (Columns<M, N>, Columns<M, P>) = (transposed(&b), transposed(&d));
-    let weighted_d = product(&q, &d);
-    let weighted_c = product(&q, &c);
+    let weighted_d = product(wide, &q, &d);
+    let weighted_c = product(wide, &q, &c);
 
-    let mut h = effort;
-    add_product(&mut h, &dt, &weighted_d);
-    add_product(&mut h, &bt, &product(&later, &b));
-    let lower = h.as_flattened_mut();
-    let pivots = cholesky::factorize(lower, M, M);
-    cholesky::invert_diagonal(lower, M);
-    let mut feedback = product(&dt, &weighted_c);
-    add_product(&mut feedback, &bt, &product(&later, &a));
-    for column in &mut feedback {
-        cholesky::solve(lower, M, column);
-    }
+    let mut factor: Columns<M, M>;
+    let mut feedback: Columns<M, N>;
+    let pivots = if let Some((pivots, lower, gain)) = given {
+        (factor, feedback) = (read(lower), read(gain));
+        pivots
+    } else {
+        factor = effort;
+        add_product(wide, &mut factor, &dt, &weighted_d);
+        add_product(wide, &mut factor, &bt, &product(wide, &later, &b));
+        let lower = factor.as_flattened_mut();
+        let pivots = cholesky::factorize(lower, M, M);
+        cholesky::invert_diagonal(lower, M);
+        feedback = product(wide, &dt, &weighted_c);
+        add_product(wide, &mut feedback, &bt, &product(wide, &later, &a));
+        for column in &mut feedback {
+            cholesky::solve(lower, M, column);
+        }
+        pivots
+    };
+    let lower = factor.as_flattened();
 
     let minus: Columns<M, N> = feedback.map(|column| column.map(|value| -value));
     let (mut transition, mut left) = (a, c);
-    add_product(&mut transition, &b, &minus);
-    add_product(&mut left, &d, &minus);
-    let weighted_left = product(&q, &left);
+    add_product(wide, &mut transition, &b, &minus);
+    add_product(wide, &mut left, &d, &minus);
+    let weighted_left = product(wide, &q, &left);
     let transition_t = transposed(&transition);
     let weighted_left_t: Columns<N, P> = transposed(&weighted_left);
-    let mut cost = product(&transition_t, &product(&later, &transition));
-    add_product(&mut cost, &weighted_left_t, &left);
     let feedback_t: Columns<N, M> = transposed(&feedback);
-    add_product(&mut cost, &feedback_t, &product(&effort, &feedback));
-    for col in 0..N {
-        for row in 0..col {
-            cost[row][col] = cost[col][row];
+    if given.is_none() {
+        let mut cost = product(wide, &transition_t, &product(wide, &later, &transition));
+        add_product(wide, &mut cost, &weighted_left_t, &left);
+        add_product(wide, &mut cost, &feedback_t, &product(wide, &effort, &feedback));
+        for col in 0..N {
+            for row in 0..col {
+                cost[row][col] = cost[col][row];
+            }
         }
+        room.cost.copy_from_slice(cost.as_flattened());
     }
 
     let mut columns = back.chunks_exact_mut(N + M);
@@ -139,7 +159,7 @@ fn sized<const N: usize, const M: usize, const P: usize>(
         put(&weighted_left_t[j], std::array::from_fn(|i| weighted_d[i][j]));
     }
     if held > 0 {
-        let held = product(&feedback_t, &s);
+        let held = product(wide, &feedback_t, &s);
         for j in 0..M {
             put(&held[j], s[j].map(|value| -value));
         }
@@ -152,7 +172,6 @@ fn sized<const N: usize, const M: usize, const P: usize>(
         column[N..].copy_from_slice(fed);
     }
     from_drive.copy_from_slice(b.as_flattened());
-    room.cost.copy_from_slice(cost.as_flattened());
     room.transition.copy_from_slice(transition.as_flattened());
     room.weighted_c.copy_from_slice(weighted_c.as_flattened());
     pivots
@@ -174,26 +193,39 @@ fn transposed<const R: usize, const C: usize>(matrix: &Columns<R, C>) -> Columns
 
 #[inline(always)]
 fn product<const R: usize, const K: usize, const C: usize>(
+    wide: impl Wide,
     left: &Columns<R, K>,
     right: &Columns<K, C>,
 ) -> Columns<R, C> {
     let mut matrix = [[0.0; R]; C];
-    add_product(&mut matrix, left, right);
+    add_product(wide, &mut matrix, left, right);
     matrix
 }
 
 /// `sum += left right`.
 #[inline(always)]
 fn add_product<const R: usize, const K: usize, const C: usize>(
+    wide: impl Wide,
     sum: &mut Columns<R, C>,
     left: &Columns<R, K>,
     right: &Columns<K, C>,
 ) {
     for (column, factors) in sum.iter_mut().zip(right) {
         let mut total = *column;
-        for (values, factor) in left.iter().zip(factors) {
-            for row in 0..R {
-                total[row] += values[row] * factor;
+        if R.is_multiple_of(HALF) {
+            // The compiler would take such columns apart.
+            for (g, total) in total.as_chunks_mut::<HALF>().0.iter_mut().enumerate() {
+                let mut half = wide.half(total);
+                for (values, factor) in left.iter().zip(factors) {
+                    half = wide.add_half(half, *factor, wide.half(&values.as_chunks().0[g]));
+                }
+                *total = wide.half_values(half);
+            }
+        } else {
+            for (values, factor) in left.iter().zip(factors) {
+                for row in 0..R {
+                    total[row] += values[row] * factor;
+                }
             }
         }
         *column = total;

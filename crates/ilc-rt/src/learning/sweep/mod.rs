@@ -16,9 +16,9 @@
 //!
 //! Family: `factor`, `recursion` and `square_root` are one backward sweep in its two forms.
 //!
-//! Family: `fixed`, `general`, `lanes` and `single` are the two sweeps, for sizes known at compile
-//! time, for any, and for one axis in several segments at a time; all take several samples at one
-//! step, which `steps` multiplies out.
+//! The sweeps take several samples at one step, whose gains `steps` multiplies out: `fixed` for sizes
+//! known at compile time, `general` for any, and `single` for one axis in several segments at a time
+//! (`lanes`).
 
 mod cholesky;
 mod factor;

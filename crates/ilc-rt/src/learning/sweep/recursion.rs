@@ -73,24 +73,30 @@ impl Recursion {
     /// `H = S + R + D'QD + B'Pi B`, `K = H^-1 (D'QC + B'Pi A)`.
     pub(super) fn step(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
         std::mem::swap(&mut self.cost, &mut self.later);
-        if self.form == Form::Joseph
-            && let Some(pivots) =
-                fixed_step::step(self.instructions, self.sizes, stage, self.room(), back, fore)
-        {
-            return pivots;
-        }
-        self.any(stage, back, fore)
-    }
-
-    /// Returns the workspace of a step of fixed size.
-    fn room(&mut self) -> fixed_step::Room<'_> {
-        let Self { later, cost, transition, weighted_c, .. } = self;
-        fixed_step::Room { later, cost, transition, weighted_c }
+        let Self { form, sizes, instructions, later, cost, lower, feedback, .. } = self;
+        let solved = (*form != Form::Joseph).then(|| {
+            for (value, (s, r)) in self.effort.iter_mut().zip(stage.s.iter().zip(&stage.r)) {
+                *value = s + r;
+            }
+            let (cost, gains) = ((&later[..], &mut cost[..]), (&mut lower[..], &mut feedback[..]));
+            self.root.step(*form, *instructions, stage, &self.effort, cost, gains)
+        });
+        let given = solved.map(|pivots| (pivots, &lower[..], &feedback[..]));
+        let (transition, weighted_c) = (&mut self.transition, &mut self.weighted_c);
+        let room = fixed_step::Room { later, cost, transition, weighted_c };
+        fixed_step::step(*instructions, *sizes, stage, given, room, back, fore)
+            .unwrap_or_else(|| self.any(stage, solved, back, fore))
     }
 
     /// [`Recursion::step`] for any sizes and forms.
     #[expect(clippy::too_many_lines, reason = "one recursion, product by product")]
-    fn any(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
+    fn any(
+        &mut self,
+        stage: &Stage,
+        solved: Option<Pivots>,
+        back: &mut [f64],
+        fore: &mut [f64],
+    ) -> Pivots {
         let Sizes { n, m, p, targets, held } = self.sizes;
         let Self { feedback, transition, left, weighted_left, effort, lower, .. } = self;
         let (a, b) = (&stage.a.as_slice()[..n * n], &stage.b.as_slice()[..n * m]);
@@ -103,8 +109,8 @@ impl Recursion {
         multiply(&mut self.weighted_d[..p * m], q, d, p, p, m);
         multiply(&mut self.weighted_c[..p * n], q, c, p, p, n);
 
-        let pivots = match self.form {
-            Form::Joseph => {
+        let pivots = match solved {
+            None => {
                 let later = &self.later[..n * n];
                 multiply(&mut self.cost_b[..n * m], later, b, n, n, m);
                 multiply(&mut self.cost_a[..n * n], later, a, n, n, n);
@@ -122,10 +128,7 @@ impl Recursion {
                 }
                 pivots
             }
-            form => {
-                let cost = (&self.later[..], &mut self.cost[..]);
-                self.root.step(form, stage, effort, cost, (lower, feedback))
-            }
+            Some(pivots) => pivots,
         };
 
         let (feedback, transition) = (&feedback[..m * n], &mut transition[..n * n]);
@@ -135,7 +138,7 @@ impl Recursion {
         left.copy_from_slice(c);
         subtract(left, d, feedback, p, m, n);
         multiply(weighted_left, q, left, p, p, n);
-        if self.form == Form::Joseph {
+        if solved.is_none() {
             // Joseph form, `(C-DK)'Q(C-DK) + K'(S+R)K + (A-BK)'Pi(A-BK)`: a sum of squares, which
             // stays positive semidefinite under rounding.
             let moved = &mut self.cost_a[..n * n];

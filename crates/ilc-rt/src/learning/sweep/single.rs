@@ -14,14 +14,16 @@ use super::{Channels, Run, Sweep};
 
 /// Largest number of states, including that of a rate penalty, that [`single`] supports.
 #[cfg(test)]
-const MAX_STATES: usize = 6;
+const MAX_STATES: usize = 3;
 
 /// Samples per step of what is solved step by step.
 const STEP: usize = 4;
+/// The same of what is solved in several segments at a time: more do not stay in registers.
+const STEP_OF_LANES: usize = 2;
 
 /// Returns the solver for a single axis.
 ///
-/// `None` unless the gains are for one input, one output and 1 to 6 states: the caller then uses
+/// `None` unless the gains are for one input, one output and 1 to 3 states: the caller then uses
 /// [`super::General`].
 pub(super) fn single(
     gains: &Gains,
@@ -32,22 +34,22 @@ pub(super) fn single(
         return None;
     }
     macro_rules! choose {
-        ($($n:literal: $s:literal;)*) => {
+        ($($n:literal)*) => {
             match gains.n_states() {
-                $($n => Box::new(Single::<$n, { rows($n, STEP) / HALF }, $s>::new(gains, channels, how)),)*
+                $($n => Box::new(Single::<$n, { rows($n, STEP) / HALF }>::new(gains, channels, how)),)*
                 _ => return None,
             }
         };
     }
-    // The more states, the more a longer step saves; but it has to stay in registers.
-    Some(choose!(1: 2; 2: 2; 3: 2; 4: 4; 5: 4; 6: 4;))
+    // With more states the waiting is hidden by the products of one step.
+    Some(choose!(1 2 3))
 }
 
-/// The solver for `N` states, in parallel by `S` samples; the columns of the gains have `G` halves.
+/// The solver for `N` states; the columns of the gains have `G` halves.
 #[derive(Debug)]
-struct Single<const N: usize, const G: usize, const S: usize> {
+struct Single<const N: usize, const G: usize> {
     alone: Alone<N, G>,
-    parallel: Option<Parallel<N, S>>,
+    parallel: Option<Parallel<N>>,
     channels: Channels,
     instructions: Instructions,
 }
@@ -63,18 +65,18 @@ struct Alone<const N: usize, const G: usize> {
 
 /// The steps of one set of gains that are solved in several segments at a time.
 #[derive(Debug)]
-struct Parallel<const N: usize, const S: usize> {
+struct Parallel<const N: usize> {
     set: usize,
-    gains: Fixed<N, S>,
+    gains: Fixed<N, STEP_OF_LANES>,
     cut: Cut<N>,
     n_blocks: usize,
 }
 
-impl<const N: usize, const G: usize, const S: usize> Single<N, G, S> {
+impl<const N: usize, const G: usize> Single<N, G> {
     fn new(gains: &Gains, channels: &Channels, instructions: Instructions) -> Self {
         let steps = Steps::new(gains, STEP);
         let mut counts: Vec<usize> = (0..steps.n_sets()).map(|set| steps.set(set).0).collect();
-        let settled = Steps::settled(gains, S);
+        let settled = Steps::settled(gains, STEP_OF_LANES);
         let longest = (0..counts.len()).max_by_key(|set| counts[*set]);
         let parallel = settled.zip(longest).and_then(|(settled, set)| {
             let gains = Fixed::new(settled.set(0).1, settled.sizes());
@@ -103,13 +105,20 @@ impl<const N: usize, const G: usize, const S: usize> Single<N, G, S> {
             for block in 0..*n_blocks {
                 let exact = (block + 1 == *n_blocks).then_some(costate);
                 let at = Place::new(channels, first * STEP + block * cut.block());
-                state = cut.solve::<HELD, S>(wide, gains, at, run, exact, |run, costate| {
-                    if block > 0 {
-                        return state;
-                    }
-                    alone.backward(wide, n_last..n_sets, first, costate, &signals, run);
-                    alone.forward(wide, n_last..n_sets, 0, [0.0; N], &signals, run)
-                });
+                state = cut.solve::<HELD, STEP_OF_LANES>(
+                    wide,
+                    gains,
+                    at,
+                    run,
+                    exact,
+                    |run, costate| {
+                        if block > 0 {
+                            return state;
+                        }
+                        alone.backward(wide, n_last..n_sets, first, costate, &signals, run);
+                        alone.forward(wide, n_last..n_sets, 0, [0.0; N], &signals, run)
+                    },
+                );
             }
         }
         alone.forward(wide, 0..n_last, last, state, &signals, run);
@@ -161,12 +170,9 @@ impl<const N: usize, const G: usize> Alone<N, G> {
 }
 
 /// A solver with the run to solve.
-struct Solve<'a, 'r, const N: usize, const G: usize, const S: usize>(
-    &'a mut Single<N, G, S>,
-    &'a mut Run<'r>,
-);
+struct Solve<'a, 'r, const N: usize, const G: usize>(&'a mut Single<N, G>, &'a mut Run<'r>);
 
-impl<const N: usize, const G: usize, const S: usize> Work for Solve<'_, '_, N, G, S> {
+impl<const N: usize, const G: usize> Work for Solve<'_, '_, N, G> {
     type Output = ();
 
     #[inline(always)]
@@ -180,7 +186,7 @@ impl<const N: usize, const G: usize, const S: usize> Work for Solve<'_, '_, N, G
     }
 }
 
-impl<const N: usize, const G: usize, const S: usize> Sweep for Single<N, G, S> {
+impl<const N: usize, const G: usize> Sweep for Single<N, G> {
     fn solve(&mut self, run: &mut Run) {
         self.instructions.run(Solve(self, run));
     }
@@ -262,7 +268,7 @@ mod tests {
                 let gains = Gains::new(&axis, 0).unwrap();
                 let channels = Channels { inputs: vec![0], outputs: vec![0], shifts: vec![1] };
                 let how = Instructions::best();
-                let solver = Single::<2, { rows(2, STEP) / HALF }, 2>::new(&gains, &channels, how);
+                let solver = Single::<2, { rows(2, STEP) / HALF }>::new(&gains, &channels, how);
                 let is_carried = solver.parallel.is_some_and(|parallel| parallel.cut.carries());
                 for width in [1, 2] {
                     agree(&gains, n_samples, width);

@@ -1,7 +1,10 @@
 //! The step of the backward recursion on a square root `U` of the cost, `Pi = U'U`.
 
+#![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
+
 use super::cholesky::{self, Pivots, VANISHED};
 use super::record::Sizes;
+use super::wide::{HALF, Instructions, Wide, Work};
 use super::{Form, Stage};
 
 /// Workspace of one step in [`Form::Cholesky`] or [`Form::SquareRoot`].
@@ -13,8 +16,14 @@ use super::{Form, Stage};
 #[derive(Debug, Clone)]
 pub(super) struct SquareRoot {
     sizes: Sizes,
-    /// `W`, (m + p + n) x (m + n), column-major.
+    /// `W`, (m + p + n) x (m + n), column-major, each column filled up with zeros to whole halves.
     stacked: Vec<f64>,
+    /// A reflector, zero above its first row.
+    reflector: Vec<[f64; HALF]>,
+    /// For each first row of a reflector, ones from there on, and a one there alone: single numbers
+    /// among those that are taken four at a time would cost more.
+    below: Vec<[f64; HALF]>,
+    unit: Vec<[f64; HALF]>,
     /// `W'W` or `R'`, (m + n) x (m + n), column-major: only its lower triangle is used.
     lower: Vec<f64>,
     /// Factors of `S + R` (m x m) and `Q` (p x p).
@@ -26,14 +35,29 @@ impl SquareRoot {
     pub(super) fn new(sizes: Sizes) -> Self {
         let Sizes { n, m, p, .. } = sizes;
         let room = |count: usize| vec![0.0; count];
-        let (stacked, lower) = (room((m + p + n) * (m + n)), room((m + n) * (m + n)));
-        Self { sizes, stacked, lower, effort: room(m * m), error: room(p * p) }
+        let rows = (m + p + n).next_multiple_of(HALF);
+        let (stacked, lower) = (room(rows * (m + n)), room((m + n) * (m + n)));
+        let masks = |is_set: fn(usize, usize) -> bool| -> Vec<[f64; HALF]> {
+            let of_row = |top| (0..rows).map(move |row| f64::from(u8::from(is_set(top, row))));
+            (0..rows).flat_map(of_row).collect::<Vec<f64>>().as_chunks().0.to_vec()
+        };
+        Self {
+            sizes,
+            stacked,
+            reflector: vec![[0.0; HALF]; rows / HALF],
+            below: masks(|top, row| row >= top),
+            unit: masks(|top, row| row == top),
+            lower,
+            effort: room(m * m),
+            error: room(p * p),
+        }
     }
 
     /// Writes the `U` of the previous sample, the Cholesky factor of `H` and `K`.
     pub(super) fn step(
         &mut self,
         form: Form,
+        how: Instructions,
         stage: &Stage,
         effort: &[f64],
         (later, earlier): (&[f64], &mut [f64]),
@@ -43,9 +67,9 @@ impl SquareRoot {
         let w = m + n;
         self.stack(stage, effort, later);
         let pivots = if form == Form::SquareRoot {
-            self.reflect()
+            how.run(Reflect(self))
         } else {
-            let rows = self.stacked.len() / w;
+            let rows = HALF * self.reflector.len();
             for j in 0..w {
                 for i in j..w {
                     let (left, right) = (&self.stacked[i * rows..], &self.stacked[j * rows..]);
@@ -76,7 +100,7 @@ impl SquareRoot {
     /// Writes `W`.
     fn stack(&mut self, stage: &Stage, effort: &[f64], later: &[f64]) {
         let Sizes { n, m, p, .. } = self.sizes;
-        let (rows, w) = (m + p + n, m + n);
+        let (rows, w) = (HALF * self.reflector.len(), m + n);
         self.effort.copy_from_slice(effort);
         cholesky::factorize(&mut self.effort, m, m);
         self.error.copy_from_slice(stage.q.as_slice());
@@ -97,7 +121,7 @@ impl SquareRoot {
                 let factor = &self.error[i * p..(i + 1) * p];
                 *value = (i..p).map(|k| factor[k] * seen[k]).sum();
             }
-            for (i, value) in column[m + p..].iter_mut().enumerate() {
+            for (i, value) in column[m + p..][..n].iter_mut().enumerate() {
                 *value = (i..n).map(|k| later[k * n + i] * next[k]).sum();
             }
         }
@@ -106,36 +130,75 @@ impl SquareRoot {
     /// Writes the transpose of the triangular factor of `W`, with a non-negative diagonal.
     ///
     /// A column with nothing left consumes no row, so that the row's content is kept.
-    fn reflect(&mut self) -> Pivots {
-        let Sizes { n, m, p, .. } = self.sizes;
-        let (rows, w) = (m + p + n, m + n);
+    #[inline(always)]
+    fn reflect(&mut self, wide: impl Wide) -> Pivots {
+        let Self { sizes: Sizes { n, m, p, .. }, stacked, reflector, lower, .. } = self;
+        let (halves, w) = (reflector.len(), *m + *n);
         let mut pivots = Pivots::NONE;
         let mut top = 0;
-        self.lower.fill(0.0);
+        lower.fill(0.0);
         for j in 0..w {
-            let (column, others) = self.stacked[j * rows..].split_at_mut(rows);
-            let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
-            let (before, rest) = (square(column), square(&column[top.min(rows)..]));
-            let gone = if j < m { !pivots.count(rest, before) } else { rest <= 0.0 };
-            if gone || (j < m && rest <= VANISHED * before) {
+            if top == *m + *p + *n {
+                break;
+            }
+            let (_, columns) = stacked.as_chunks_mut::<HALF>().0.split_at_mut(j * halves);
+            let (column, others) = columns.split_at_mut(halves);
+            let masks = &self.below[top * halves..][..halves];
+            let zero = wide.half(&[0.0; HALF]);
+            for ((to, from), mask) in reflector.iter_mut().zip(&*column).zip(masks) {
+                let half = wide.add_product(zero, wide.half(from), wide.half(mask));
+                *to = wide.half_values(half);
+            }
+            let (before, rest) = (dot(wide, column, column), dot(wide, reflector, reflector));
+            let gone = if j < *m { !pivots.count(rest, before) } else { rest <= 0.0 };
+            if gone || (j < *m && rest <= VANISHED * before) {
                 continue;
             }
             let norm = rest.sqrt();
-            let sign = if column[top] > 0.0 { 1.0 } else { -1.0 };
-            let reflector = &mut column[top..];
-            reflector[0] += sign * norm;
-            let scale = 2.0 / (2.0 * norm * (norm + (reflector[0] - sign * norm).abs()));
-            self.lower[j * w + j] = norm;
-            for (i, other) in others.chunks_exact_mut(rows).enumerate() {
-                let other = &mut other[top..];
-                let along: f64 = reflector.iter().zip(&*other).map(|(v, x)| v * x).sum();
-                for (value, v) in other.iter_mut().zip(&*reflector) {
-                    *value -= scale * along * v;
-                }
-                self.lower[j * w + j + 1 + i] = -sign * other[0];
+            let value = column.as_flattened()[top];
+            let sign = if value > 0.0 { 1.0 } else { -1.0 };
+            let scale = -1.0 / (norm * (norm + value.abs()));
+            let units = &self.unit[top * halves..][..halves];
+            add(wide, reflector, sign * norm, units);
+            lower[j * w + j] = norm;
+            for (i, other) in others.chunks_exact_mut(halves).enumerate() {
+                let along = scale * dot(wide, reflector, other);
+                add(wide, other, along, reflector);
+                lower[j * w + j + 1 + i] = -sign * other.as_flattened()[top];
             }
             top += 1;
         }
         pivots
     }
+}
+
+/// The reflections, for the widest instructions of the processor.
+struct Reflect<'a>(&'a mut SquareRoot);
+
+impl Work for Reflect<'_> {
+    type Output = Pivots;
+
+    #[inline(always)]
+    fn with(self, wide: impl Wide) -> Pivots {
+        self.0.reflect(wide)
+    }
+}
+
+/// `sum += factor vector`.
+#[inline(always)]
+fn add(wide: impl Wide, sum: &mut [[f64; HALF]], factor: f64, vector: &[[f64; HALF]]) {
+    for (sum, half) in sum.iter_mut().zip(vector) {
+        *sum = wide.half_values(wide.add_half(wide.half(sum), factor, wide.half(half)));
+    }
+}
+
+/// Returns the scalar product of two vectors.
+#[inline(always)]
+fn dot(wide: impl Wide, left: &[[f64; HALF]], right: &[[f64; HALF]]) -> f64 {
+    let mut sum = wide.half(&[0.0; HALF]);
+    for (left, right) in left.iter().zip(right) {
+        sum = wide.add_product(sum, wide.half(left), wide.half(right));
+    }
+    let [a, b, c, d] = wide.half_values(sum);
+    (a + b) + (c + d)
 }

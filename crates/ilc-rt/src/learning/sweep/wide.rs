@@ -36,6 +36,9 @@ pub(in crate::learning) trait Wide: Copy {
     /// Returns `sum + factor half`.
     fn add_half(self, sum: Self::Half, factor: f64, half: Self::Half) -> Self::Half;
 
+    /// Returns `sum` plus the products of the numbers, one by one.
+    fn add_product(self, sum: Self::Half, left: Self::Half, right: Self::Half) -> Self::Half;
+
     /// Loads a row.
     fn row(self, values: &[f64; LANES]) -> Self::Row;
 
@@ -132,6 +135,11 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
+    fn add_product(self, sum: Self::Half, left: Self::Half, right: Self::Half) -> Self::Half {
+        std::array::from_fn(|lane| sum[lane] + left[lane] * right[lane])
+    }
+
+    #[inline(always)]
     fn row(self, values: &[f64; LANES]) -> Self::Row {
         *values
     }
@@ -206,6 +214,11 @@ mod avx {
         fn add_half(self, sum: Self::Half, factor: f64, half: Self::Half) -> Self::Half {
             let simd = self.avx;
             simd._mm256_add_pd(sum, simd._mm256_mul_pd(simd._mm256_set1_pd(factor), half))
+        }
+
+        #[inline(always)]
+        fn add_product(self, sum: Self::Half, left: Self::Half, right: Self::Half) -> Self::Half {
+            self.avx._mm256_add_pd(sum, self.avx._mm256_mul_pd(left, right))
         }
 
         #[inline(always)]
