@@ -56,6 +56,7 @@ pub struct Gains {
     n_samples: usize,
     free_samples: usize,
     sizes: Sizes,
+    remembers_change: bool,
     /// [`Record::back`] and [`Record::fore`] of each set, in the order of the recursion: those of
     /// the last samples, the steady-state one, those of the first samples. There may be more room.
     back: Vec<f64>,
@@ -111,6 +112,7 @@ impl Gains {
             n_samples,
             free_samples,
             sizes,
+            remembers_change: stages.remembers_change(),
             back: Vec::new(),
             fore: Vec::new(),
             n_stored: 0,
@@ -229,6 +231,11 @@ impl Gains {
 
     pub(super) fn sizes(&self) -> Sizes {
         self.sizes
+    }
+
+    /// Returns [`Stages::remembers_change`] of the stages.
+    pub(super) fn remembers_change(&self) -> bool {
+        self.remembers_change
     }
 
     /// Returns the gains of sample `k`.

@@ -15,35 +15,49 @@ const FORGOTTEN: f64 = 1e-18;
 /// Largest remainder of a state after a whole segment: rounding errors must fade from cut to cut.
 const FADED: f64 = 0.1;
 
-/// The gains of a step of `S` samples, with sizes known at compile time, row by row.
+/// Samples per step: more do not stay in registers.
+pub(super) const STEP: usize = 2;
+
+/// The gains of a step, with sizes known at compile time, row by row.
+///
+/// The states from `MODEL` on are the last change of the input ([`super::Rate`]): one, or none. Its row
+/// of the forward sweep is the change once more, and its row of the backward one is that of `kappa`
+/// times a number, as nothing but the feedback `f` from it depends on it: `p_k = -f H kappa_k`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fixed<const N: usize, const S: usize> {
+pub(super) struct Fixed<const N: usize, const MODEL: usize> {
     /// Of the costate, in this order: from itself, from error and input.
     costate: [[f64; N]; N],
-    from_error: [[f64; S]; N],
-    from_input: [[f64; S]; N],
+    from_error: [[f64; STEP]; N],
+    from_input: [[f64; STEP]; N],
     /// Of `kappa`, which no earlier sample affects.
-    kappa: [[f64; N]; S],
-    kappa_from_error: [[f64; S]; S],
-    kappa_from_input: [[f64; S]; S],
+    kappa: [[f64; N]; STEP],
+    kappa_from_error: [[f64; STEP]; STEP],
+    kappa_from_input: [[f64; STEP]; STEP],
     /// Of the state and of the change, from the state and from `kappa`, of which no later sample
     /// affects the change.
     state: [[f64; N]; N],
-    from_kappa: [[f64; S]; N],
-    change: [[f64; N]; S],
-    change_from_kappa: [[f64; S]; S],
+    from_kappa: [[f64; STEP]; N],
+    change: [[f64; N]; STEP],
+    change_from_kappa: [[f64; STEP]; STEP],
+    /// `-f H`.
+    last: f64,
 }
 
-impl<const N: usize, const S: usize> Fixed<N, S> {
+impl<const N: usize, const MODEL: usize> Fixed<N, MODEL> {
     /// Reads the gains of a step of one input and one target.
     pub(super) fn new(record: Record, sizes: Sizes) -> Self {
-        let rows = rows(N, S);
+        let rows = rows(N, STEP);
         let back = |row: usize, col: usize| record.back[col * rows + row];
         let fore = |row: usize, col: usize| record.fore[col * rows + row];
         let input = |row: usize, s: usize| {
-            if sizes.held > 0 { back(row, N + S + s) } else { 0.0 }
+            if sizes.held > 0 { back(row, N + STEP + s) } else { 0.0 }
         };
+        // The quotient of these rows wherever it is most exact.
+        let columns = || (0..N + STEP).map(|col| (back(N - 1, col), back(below(N), col)));
+        let (change, kappa) =
+            columns().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or_default();
         Self {
+            last: if kappa == 0.0 { 0.0 } else { change / kappa },
             costate: matrix(back),
             from_error: matrix(|i, s| back(i, N + s)),
             from_input: matrix(input),
@@ -65,25 +79,25 @@ fn matrix<const R: usize, const C: usize>(entry: impl Fn(usize, usize) -> f64) -
 
 /// Goes back one step and returns its `kappa`.
 #[inline(always)]
-pub(super) fn backward<const HELD: bool, const N: usize, const S: usize, W: Wide>(
+pub(super) fn backward<const HELD: bool, const N: usize, const MODEL: usize, W: Wide>(
     wide: W,
-    gains: &Fixed<N, S>,
+    gains: &Fixed<N, MODEL>,
     costate: &mut [W::Row; N],
-    input: &[W::Row; S],
-    error: &[W::Row; S],
-) -> [W::Row; S] {
+    input: &[W::Row; STEP],
+    error: &[W::Row; STEP],
+) -> [W::Row; STEP] {
     // Column by column: the processor has many sums under way, and those that do not wait for the
     // previous step come first.
     let mut earlier = *costate;
     let mut kappa = *error;
-    for i in 0..N {
+    for i in 0..MODEL {
         earlier[i] = wide.scale(gains.from_error[i][0], error[0]);
     }
-    for s in 0..S {
+    for s in 0..STEP {
         kappa[s] = wide.scale(gains.kappa_from_error[s][s], error[s]);
     }
-    for from in 1..S {
-        for i in 0..N {
+    for from in 1..STEP {
+        for i in 0..MODEL {
             earlier[i] = wide.add(earlier[i], wide.scale(gains.from_error[i][from], error[from]));
         }
         for s in 0..from {
@@ -91,8 +105,8 @@ pub(super) fn backward<const HELD: bool, const N: usize, const S: usize, W: Wide
         }
     }
     if HELD {
-        for from in 0..S {
-            for i in 0..N {
+        for from in 0..STEP {
+            for i in 0..MODEL {
                 earlier[i] =
                     wide.add(earlier[i], wide.scale(gains.from_input[i][from], input[from]));
             }
@@ -103,12 +117,15 @@ pub(super) fn backward<const HELD: bool, const N: usize, const S: usize, W: Wide
         }
     }
     for j in 0..N {
-        for s in 0..S {
+        for s in 0..STEP {
             kappa[s] = wide.add(kappa[s], wide.scale(gains.kappa[s][j], costate[j]));
         }
-        for i in 0..N {
+        for i in 0..MODEL {
             earlier[i] = wide.add(earlier[i], wide.scale(gains.costate[i][j], costate[j]));
         }
+    }
+    for i in MODEL..N {
+        earlier[i] = wide.scale(gains.last, kappa[0]);
     }
     *costate = earlier;
     kappa
@@ -116,35 +133,38 @@ pub(super) fn backward<const HELD: bool, const N: usize, const S: usize, W: Wide
 
 /// Goes on one step and returns the changes of the input.
 #[inline(always)]
-pub(super) fn forward<const N: usize, const S: usize, W: Wide>(
+pub(super) fn forward<const N: usize, const MODEL: usize, W: Wide>(
     wide: W,
-    gains: &Fixed<N, S>,
+    gains: &Fixed<N, MODEL>,
     state: &mut [W::Row; N],
-    kappa: &[W::Row; S],
-) -> [W::Row; S] {
+    kappa: &[W::Row; STEP],
+) -> [W::Row; STEP] {
     let mut later = *state;
     let mut change = *kappa;
-    for i in 0..N {
+    for i in 0..MODEL {
         later[i] = wide.scale(gains.from_kappa[i][0], kappa[0]);
     }
-    for from in 0..S {
-        for s in from + 1..S {
+    for from in 0..STEP {
+        for s in from + 1..STEP {
             change[s] =
                 wide.add(change[s], wide.scale(gains.change_from_kappa[s][from], kappa[from]));
         }
         if from > 0 {
-            for i in 0..N {
+            for i in 0..MODEL {
                 later[i] = wide.add(later[i], wide.scale(gains.from_kappa[i][from], kappa[from]));
             }
         }
     }
     for j in 0..N {
-        for s in 0..S {
+        for s in 0..STEP {
             change[s] = wide.add(change[s], wide.scale(gains.change[s][j], state[j]));
         }
-        for i in 0..N {
+        for i in 0..MODEL {
             later[i] = wide.add(later[i], wide.scale(gains.state[i][j], state[j]));
         }
+    }
+    for i in MODEL..N {
+        later[i] = change[STEP - 1];
     }
     *state = later;
     change
@@ -160,7 +180,7 @@ pub(super) enum Fade<const N: usize> {
     Never,
 }
 
-impl<const N: usize, const S: usize> Fixed<N, S> {
+impl<const N: usize, const MODEL: usize> Fixed<N, MODEL> {
     /// Returns the remainder of a state after `longest` steps.
     pub(super) fn fade(&self, longest: usize) -> Fade<N> {
         let mut power: [[f64; N]; N] =

@@ -11,7 +11,7 @@
 
 #![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 
-use super::lane_step::{Fade, Fixed, backward, forward};
+use super::lane_step::{Fade, Fixed, STEP, backward, forward};
 use super::tile::{Channel, Fetch, TILE};
 use super::wide::{LANES, Lanes, Wide};
 use super::{Channels, Run};
@@ -51,14 +51,17 @@ pub(super) struct Cut<const N: usize> {
 
 impl<const N: usize> Cut<N> {
     /// Returns the cut of `n_samples` samples, or `None` if it does not pay.
-    pub(super) fn new<const S: usize>(gains: &Fixed<N, S>, n_samples: usize) -> Option<Self> {
+    pub(super) fn new<const MODEL: usize>(
+        gains: &Fixed<N, MODEL>,
+        n_samples: usize,
+    ) -> Option<Self> {
         let shortest = n_samples / (LANES * TILE);
         if shortest == 0 {
             return None;
         }
         // Eight segments at a time are worth a warm-up of up to their own length.
-        let warm_up = match gains.fade(shortest * TILE / S) {
-            Fade::Forgotten(steps) => (steps.max(1) * S).div_ceil(TILE),
+        let warm_up = match gains.fade(shortest * TILE / STEP) {
+            Fade::Forgotten(steps) => (steps.max(1) * STEP).div_ceil(TILE),
             Fade::To(across) => return Some(Self::with(shortest, shortest, Some(Across(across)))),
             Fade::Never => return None,
         };
@@ -88,10 +91,10 @@ impl<const N: usize> Cut<N> {
     /// `last` is the costate after the last block; `meanwhile` receives the costate at the start of
     /// this one and returns the state there.
     #[inline(always)]
-    pub(super) fn solve<const HELD: bool, const S: usize>(
+    pub(super) fn solve<const HELD: bool, const MODEL: usize>(
         &mut self,
         wide: impl Wide,
-        gains: &Fixed<N, S>,
+        gains: &Fixed<N, MODEL>,
         place: Place,
         run: &mut Run,
         last: Option<[f64; N]>,
@@ -113,8 +116,8 @@ impl<const N: usize> Cut<N> {
         let mut costate = [zero; N];
         for tile in (0..*warm_up).rev() {
             let (error, input) = fetch.tile(wide, run, &beyond, tile);
-            for (error, input) in steps::<_, S>(&error).iter().zip(steps::<_, S>(&input)).rev() {
-                backward::<HELD, N, S, _>(wide, gains, &mut costate, input, error);
+            for (error, input) in steps(&error).iter().zip(steps(&input)).rev() {
+                backward::<HELD, N, MODEL, _>(wide, gains, &mut costate, input, error);
             }
         }
         let mut ends = values(wide, &costate);
@@ -127,12 +130,11 @@ impl<const N: usize> Cut<N> {
         let mut costate = rows(wide, &ends);
         for (tile, kappa) in kappa[1..].chunks_exact_mut(TILE).enumerate().rev() {
             let (error, input) = fetch.tile(wide, run, &firsts, tile);
-            let kappa = kappa.as_chunks_mut::<S>().0.iter_mut();
-            for ((error, input), kappa) in
-                steps::<_, S>(&error).iter().zip(steps::<_, S>(&input)).zip(kappa).rev()
+            let kappa = kappa.as_chunks_mut::<STEP>().0.iter_mut();
+            for ((error, input), kappa) in steps(&error).iter().zip(steps(&input)).zip(kappa).rev()
             {
-                let rows = backward::<HELD, N, S, _>(wide, gains, &mut costate, input, error);
-                for s in 0..S {
+                let rows = backward::<HELD, N, MODEL, _>(wide, gains, &mut costate, input, error);
+                for s in 0..STEP {
                     kappa[s] = Lanes(wide.values(rows[s]));
                 }
             }
@@ -143,9 +145,9 @@ impl<const N: usize> Cut<N> {
         // the first one reads there is ignored.
         let mut state = [zero; N];
         let begin = length - *warm_up * TILE;
-        for first in (begin..length).step_by(S) {
-            let mut rows = [zero; S];
-            for s in 0..S {
+        for first in (begin..length).step_by(STEP) {
+            let mut rows = [zero; STEP];
+            for s in 0..STEP {
                 let mut moved = [0.0; LANES];
                 moved[0] = kappa[first + s].0[LANES - 1];
                 moved[1..].copy_from_slice(&kappa[first + s + 1].0[..LANES - 1]);
@@ -161,10 +163,10 @@ impl<const N: usize> Cut<N> {
         let mut state = rows(wide, &starts);
         for (tile, kappa) in kappa[1..].chunks_exact(TILE).enumerate() {
             let mut change = [zero; TILE];
-            let kappa = kappa.as_chunks::<S>().0;
-            for (change, kappa) in change.as_chunks_mut::<S>().0.iter_mut().zip(kappa) {
-                let mut rows = [zero; S];
-                for s in 0..S {
+            let kappa = kappa.as_chunks::<STEP>().0;
+            for (change, kappa) in change.as_chunks_mut::<STEP>().0.iter_mut().zip(kappa) {
+                let mut rows = [zero; STEP];
+                for s in 0..STEP {
                     rows[s] = wide.row(&kappa[s].0);
                 }
                 *change = forward(wide, gains, &mut state, &rows);
@@ -244,6 +246,6 @@ fn replace<const N: usize>(values: &mut [[f64; LANES]; N], lane: usize, exact: [
 
 /// Returns the steps of a tile.
 #[inline(always)]
-fn steps<R, const S: usize>(tile: &[R; TILE]) -> &[[R; S]] {
+fn steps<R>(tile: &[R; TILE]) -> &[[R; STEP]] {
     tile.as_chunks().0
 }

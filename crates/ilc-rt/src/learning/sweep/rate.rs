@@ -62,6 +62,10 @@ impl<S: Stages> Stages for Rate<S> {
     fn has_constant_plant(&self) -> bool {
         self.inner.has_constant_plant()
     }
+
+    fn remembers_change(&self) -> bool {
+        true
+    }
 }
 
 impl<S> Rate<S> {

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::factor::Gains;
 use super::fixed::{self, Signals};
-use super::lane_step::Fixed;
+use super::lane_step::{self, Fixed};
 use super::lanes::{Cut, Place};
 use super::steps::{Steps, rows};
 use super::wide::{HALF, Instructions, Wide, Work};
@@ -18,8 +18,6 @@ const MAX_STATES: usize = 3;
 
 /// Samples per step of what is solved step by step.
 const STEP: usize = 4;
-/// The same of what is solved in several segments at a time: more do not stay in registers.
-const STEP_OF_LANES: usize = 2;
 
 /// Returns the solver for a single axis.
 ///
@@ -34,22 +32,25 @@ pub(super) fn single(
         return None;
     }
     macro_rules! choose {
-        ($($n:literal)*) => {
-            match gains.n_states() {
-                $($n => Box::new(Single::<$n, { rows($n, STEP) / HALF }>::new(gains, channels, how)),)*
+        ($($n:literal $changes:literal)*) => {
+            match (gains.n_states(), usize::from(gains.remembers_change())) {
+                $(($n, $changes) => Box::new(
+                    Single::<$n, { rows($n, STEP) / HALF }, { $n - $changes }>::new(gains, channels, how)
+                ),)*
                 _ => return None,
             }
         };
     }
     // With more states the waiting is hidden by the products of one step.
-    Some(choose!(1 2 3))
+    Some(choose!(1 0 2 0 3 0 2 1 3 1))
 }
 
-/// The solver for `N` states; the columns of the gains have `G` halves.
+/// The solver for `N` states, `MODEL` of them that of the model; the columns of the gains have `G`
+/// halves.
 #[derive(Debug)]
-struct Single<const N: usize, const G: usize> {
+struct Single<const N: usize, const G: usize, const MODEL: usize> {
     alone: Alone<N, G>,
-    parallel: Option<Parallel<N>>,
+    parallel: Option<Parallel<N, MODEL>>,
     channels: Channels,
     instructions: Instructions,
 }
@@ -65,18 +66,18 @@ struct Alone<const N: usize, const G: usize> {
 
 /// The steps of one set of gains that are solved in several segments at a time.
 #[derive(Debug)]
-struct Parallel<const N: usize> {
+struct Parallel<const N: usize, const MODEL: usize> {
     set: usize,
-    gains: Fixed<N, STEP_OF_LANES>,
+    gains: Fixed<N, MODEL>,
     cut: Cut<N>,
     n_blocks: usize,
 }
 
-impl<const N: usize, const G: usize> Single<N, G> {
+impl<const N: usize, const G: usize, const MODEL: usize> Single<N, G, MODEL> {
     fn new(gains: &Gains, channels: &Channels, instructions: Instructions) -> Self {
         let steps = Steps::new(gains, STEP);
         let mut counts: Vec<usize> = (0..steps.n_sets()).map(|set| steps.set(set).0).collect();
-        let settled = Steps::settled(gains, STEP_OF_LANES);
+        let settled = Steps::settled(gains, lane_step::STEP);
         let longest = (0..counts.len()).max_by_key(|set| counts[*set]);
         let parallel = settled.zip(longest).and_then(|(settled, set)| {
             let gains = Fixed::new(settled.set(0).1, settled.sizes());
@@ -105,20 +106,13 @@ impl<const N: usize, const G: usize> Single<N, G> {
             for block in 0..*n_blocks {
                 let exact = (block + 1 == *n_blocks).then_some(costate);
                 let at = Place::new(channels, first * STEP + block * cut.block());
-                state = cut.solve::<HELD, STEP_OF_LANES>(
-                    wide,
-                    gains,
-                    at,
-                    run,
-                    exact,
-                    |run, costate| {
-                        if block > 0 {
-                            return state;
-                        }
-                        alone.backward(wide, n_last..n_sets, first, costate, &signals, run);
-                        alone.forward(wide, n_last..n_sets, 0, [0.0; N], &signals, run)
-                    },
-                );
+                state = cut.solve::<HELD, MODEL>(wide, gains, at, run, exact, |run, costate| {
+                    if block > 0 {
+                        return state;
+                    }
+                    alone.backward(wide, n_last..n_sets, first, costate, &signals, run);
+                    alone.forward(wide, n_last..n_sets, 0, [0.0; N], &signals, run)
+                });
             }
         }
         alone.forward(wide, 0..n_last, last, state, &signals, run);
@@ -170,9 +164,12 @@ impl<const N: usize, const G: usize> Alone<N, G> {
 }
 
 /// A solver with the run to solve.
-struct Solve<'a, 'r, const N: usize, const G: usize>(&'a mut Single<N, G>, &'a mut Run<'r>);
+struct Solve<'a, 'r, const N: usize, const G: usize, const MODEL: usize>(
+    &'a mut Single<N, G, MODEL>,
+    &'a mut Run<'r>,
+);
 
-impl<const N: usize, const G: usize> Work for Solve<'_, '_, N, G> {
+impl<const N: usize, const G: usize, const MODEL: usize> Work for Solve<'_, '_, N, G, MODEL> {
     type Output = ();
 
     #[inline(always)]
@@ -186,7 +183,7 @@ impl<const N: usize, const G: usize> Work for Solve<'_, '_, N, G> {
     }
 }
 
-impl<const N: usize, const G: usize> Sweep for Single<N, G> {
+impl<const N: usize, const G: usize, const MODEL: usize> Sweep for Single<N, G, MODEL> {
     fn solve(&mut self, run: &mut Run) {
         self.instructions.run(Solve(self, run));
     }
@@ -268,7 +265,7 @@ mod tests {
                 let gains = Gains::new(&axis, 0).unwrap();
                 let channels = Channels { inputs: vec![0], outputs: vec![0], shifts: vec![1] };
                 let how = Instructions::best();
-                let solver = Single::<2, { rows(2, STEP) / HALF }>::new(&gains, &channels, how);
+                let solver = Single::<2, { rows(2, STEP) / HALF }, 2>::new(&gains, &channels, how);
                 let is_carried = solver.parallel.is_some_and(|parallel| parallel.cut.carries());
                 for width in [1, 2] {
                     agree(&gains, n_samples, width);

@@ -87,6 +87,12 @@ pub trait Stages {
     fn has_constant_plant(&self) -> bool {
         self.constant() == (0..self.n_samples())
     }
+
+    /// Returns true if the last states, one per input, are its last change, on which nothing but
+    /// penalties depends.
+    fn remembers_change(&self) -> bool {
+        false
+    }
 }
 
 impl<S: Stages + ?Sized> Stages for &S {
@@ -120,5 +126,9 @@ impl<S: Stages + ?Sized> Stages for &S {
 
     fn has_constant_plant(&self) -> bool {
         (**self).has_constant_plant()
+    }
+
+    fn remembers_change(&self) -> bool {
+        (**self).remembers_change()
     }
 }
