@@ -49,7 +49,8 @@ class Analysis:
     n_samples : int
         Samples of a run.
     method : {"dense", "structured"}
-        Method of the analysis.
+        Method of the analysis: whole matrices, or products with signals in long runs and where they
+        say as much.
     converges : bool
         The error converges, without excessive transient growth.
     monotonic : bool

@@ -232,7 +232,8 @@ fn every_law_on_other_axes_has_the_norm_of_its_dense_matrix() {
             let t = dense_of(law.as_mut(), &plant, n, &free);
             let expected = largest_singular(&t);
             let found = analyze(law.as_mut(), &plant, n, &Question::default()).unwrap();
-            assert_eq!(found.method, Method::Dense);
+            // On its own model a law without `rate` needs no matrix.
+            assert!(found.method == Method::Dense || which == "itself", "{name}");
             check(&name, &found, expected, found.spectral_radius.value);
             // The method for long runs, applied to the same run.
             let products = by_products(law.as_mut(), &plant, n);
