@@ -50,8 +50,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Refuse to share costly fixtures out among the workers: each would make its own."""
-    # Thousands of tests and all that they import stay until the end: no search for garbage finds any
-    # among them.
+    # Thousands of tests and all that they import stay until the end: the search for garbage is to
+    # leave them out.
     gc.collect()
     gc.freeze()
     if not getattr(session.config.option, "loadgroup", False):

@@ -133,7 +133,7 @@ def run(text: str, folder: Path) -> str:
 
 
 @cache
-def made(target: str) -> None:
+def ask_make(target: str) -> None:
     """Let `make` say what it would do for a target; it must know it."""
     run(shorter(f"make {target}"), ROOT)
 
@@ -367,7 +367,7 @@ def test_verbs_and_options_in_running_text_exist(document: Path) -> None:
             for option in (word.split("=")[0] for word in rest if word.startswith("--")):
                 assert re.search(rf"{option}\b", said), f"{document}:{number}: {code}"
         for target in re.findall(r"`make ([a-z-]+)`", line):
-            made(target)
+            ask_make(target)
 
 
 def test_there_is_something_to_run() -> None:
