@@ -23,10 +23,37 @@ const REPEATS: usize = 21;
 
 fn main() -> Result<(), Box<dyn Error>> {
     update_against_dense()?;
-    for n_runs in [10, 100] {
-        lockstep_against_real_time(n_runs)?;
+    for (n_axes, n_runs) in [(2, 10), (2, 100), (6, 20), (12, 20)] {
+        lockstep_against_real_time(n_axes, n_runs)?;
     }
     Ok(())
+}
+
+/// The example gantry, its pair of axes repeated; with more than one pair it learns from the drives.
+fn gantry(n_pairs: usize) -> Result<Cell, Box<dyn Error>> {
+    let text = std::fs::read_to_string(ilc_tests::root().join("examples/01_gantry.toml"))?;
+    let first = text.find("[[axis]]").ok_or("no axes")?;
+    let (pair, rest) = text[first..].split_once("[tcp_encoder]").ok_or("no encoder")?;
+    if n_pairs == 1 {
+        return Ok(Cell::parse(&text, "gantry.toml")?);
+    }
+    let (_, rest) = rest.split_once("[program]").ok_or("no program")?;
+    let mut cell = text[..first].to_owned();
+    for i in 0..n_pairs {
+        let names =
+            pair.replace("\"x\"", &format!("\"x{i}\"")).replace("\"y\"", &format!("\"y{i}\""));
+        let nodes = names.replace("node = 2", &format!("node = {}", 2 * i + 2));
+        cell += &nodes.replace("node = 1", &format!("node = {}", 2 * i + 1));
+    }
+    let points = rest.lines().map(|line| match line.split_once(" = [") {
+        Some((key, point)) => {
+            format!("{key} = [{}]", vec![point.trim_end_matches(']'); n_pairs].join(", "))
+        }
+        None => line.replace("measure = \"tcp\"", ""),
+    });
+    cell += "[program]";
+    cell += &points.collect::<Vec<_>>().join("\n");
+    Ok(Cell::parse(&cell, "gantry.toml")?)
 }
 
 /// Median time of `work`.
@@ -87,9 +114,8 @@ fn time_update(
     }))
 }
 
-fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
-    let root = ilc_tests::root();
-    let cell = Cell::load(&root.join("examples/01_gantry.toml"))?;
+fn lockstep_against_real_time(n_axes: usize, n_runs: u32) -> Result<(), Box<dyn Error>> {
+    let cell = gantry(n_axes / 2)?;
     let drives = Machine::from_cell(&cell, ClockMode::LockStep)?;
     let library = std::env::temp_dir().join(format!("ilc-bench-{}.db", std::process::id()));
     let mut options: Options = parse(&["--lockstep".to_owned(), "--no-telemetry".to_owned()])?;
@@ -107,8 +133,8 @@ fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
     let a_run_s = n_samples as f64 * cell.cycle_s() + cell.program.settle_s;
     let stands_for_s = f64::from(n_runs) * a_run_s;
     println!(
-        "lock-step, in process, every run kept on disk: {n_runs} runs in {took:.3?}, {:.0} times faster \
-         than real time",
+        "lock-step, in process, every run kept on disk: {n_axes} axes, {n_runs} runs in {took:.3?}, \
+         {:.0} times faster than real time",
         stands_for_s / took.as_secs_f64()
     );
     Ok(())
