@@ -14,9 +14,9 @@ BIN     := $(VENV)/bin
 TARGET  := $(or $(CARGO_TARGET_DIR),target)
 SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.toml') \
            Cargo.toml Cargo.lock pyproject.toml README.md
-# Half of the Python tests wait for a process or for time to pass. A file with costly fixtures of its own
+# More than half of the time Python tests wait for a process or for time to pass. A file with costly fixtures of its own
 # is kept together by the mark xdist_group.
-JOBS    := $(shell expr 2 \* $$(nproc))
+JOBS    := $(shell expr 3 \* $$(nproc))
 
 # Every worker of pytest would compile every test anew.
 unexport PYTHONDONTWRITEBYTECODE
