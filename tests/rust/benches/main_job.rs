@@ -49,7 +49,7 @@ fn gantry(n_pairs: usize) -> Result<Cell, Box<dyn Error>> {
         Some((key, point)) => {
             format!("{key} = [{}]", vec![point.trim_end_matches(']'); n_pairs].join(", "))
         }
-        None => line.replace("measure = \"tcp\"", ""),
+        None => line.replace("\"tcp\"", "\"encoder\""),
     });
     cell += "[program]";
     cell += &points.collect::<Vec<_>>().join("\n");

@@ -28,7 +28,7 @@ pub enum Form {
     Joseph,
     /// Square root of the cost, by Cholesky factorisation of the sample's whole cost.
     Cholesky,
-    /// Square root of the cost, by Householder reflections: nothing is squared, at twice the time.
+    /// Square root of the cost, by Householder reflections: nothing is squared, at three times the time.
     SquareRoot,
 }
 
