@@ -1,5 +1,7 @@
 //! The backward Riccati recursion along a run: gains from model and weights.
 
+use std::ops::Range;
+
 use thiserror::Error;
 
 use super::cholesky::Pivots;
@@ -259,10 +261,10 @@ impl Gains {
         (self.n_settled > 0).then(|| self.at(self.n_samples - 1 - self.n_tail))
     }
 
-    /// Returns true if the gains of sample `k` are those in steady state.
-    pub(super) fn is_settled(&self, k: usize) -> bool {
-        let first = self.n_samples - self.n_tail - self.n_settled;
-        (first..first + self.n_settled).contains(&k)
+    /// Returns the samples whose gains are those in steady state.
+    pub(super) fn settled_samples(&self) -> Range<usize> {
+        let end = self.n_samples - self.n_tail;
+        end - self.n_settled..end
     }
 
     /// Goes back one sample, with the stage last read.

@@ -46,12 +46,14 @@ impl<const N: usize, const M: usize, const G: usize> Work for Sweep<'_, '_, N, M
     fn with(self, wide: impl Wide) {
         let Self { steps, channels, kappa, run } = self;
         let signals = Signals::<M>::new(channels, steps, run);
+        let width = below(M);
         let mut costate = [0.0; N];
         let mut end = steps.n_steps();
         for place in 0..steps.n_sets() {
             let (count, gains) = steps.set(place);
             let these = end - count..end;
             end = these.start;
+            let kappa = &mut kappa[these.start * width..these.end * width];
             backward::<N, M, G>(wide, gains, &signals, run, &mut costate, these, kappa);
         }
         let mut state = [0.0; N];
@@ -59,6 +61,7 @@ impl<const N: usize, const M: usize, const G: usize> Work for Sweep<'_, '_, N, M
             let (count, gains) = steps.set(place);
             let these = end..end + count;
             end = these.end;
+            let kappa = &kappa[these.start * width..these.end * width];
             forward::<N, M, G>(wide, gains, &signals, run, &mut state, these, kappa);
         }
     }
@@ -140,7 +143,7 @@ impl<const M: usize> Places<M> {
     }
 }
 
-/// Sweeps backward over some steps of the same gains, and writes their `kappa`.
+/// Sweeps backward over some steps of the same gains, and writes their `kappa`, for these steps alone.
 #[inline(always)]
 pub(super) fn backward<const N: usize, const M: usize, const G: usize>(
     wide: impl Wide,
@@ -156,7 +159,7 @@ pub(super) fn backward<const N: usize, const M: usize, const G: usize>(
     let Some((from_error, from_input)) = fresh.split_first_chunk::<M>() else { return };
     let kappa = kappa.as_chunks_mut::<HALF>().0;
     let halves = G - below(N) / HALF;
-    for step in steps.rev() {
+    for (i, step) in steps.enumerate().rev() {
         // The terms that do not wait for the previous step come first.
         let mut sum = [wide.half(&[0.0; HALF]); G];
         for (value, column) in signals.outputs.load(run.error, step).iter().zip(from_error) {
@@ -171,7 +174,7 @@ pub(super) fn backward<const N: usize, const M: usize, const G: usize>(
             add(wide, &mut sum, *value, column);
         }
         read(wide, &sum, 0, costate);
-        for (kappa, half) in kappa[step * halves..].iter_mut().zip(&sum[G - halves..]) {
+        for (kappa, half) in kappa[i * halves..].iter_mut().zip(&sum[G - halves..]) {
             *kappa = wide.half_values(*half);
         }
     }
@@ -193,8 +196,8 @@ pub(super) fn forward<const N: usize, const M: usize, const G: usize>(
     let Some(from_kappa) = from_kappa.first_chunk::<M>() else { return };
     let kappa = kappa.as_chunks::<HALF>().0;
     let halves = G - below(N) / HALF;
-    for step in steps {
-        let kappa = &kappa[step * halves..][..halves];
+    for (i, step) in steps.enumerate() {
+        let kappa = &kappa[i * halves..][..halves];
         let mut sum = [wide.half(&[0.0; HALF]); G];
         for (half, kappa) in sum[G - halves..].iter_mut().zip(kappa) {
             *half = wide.half(kappa);

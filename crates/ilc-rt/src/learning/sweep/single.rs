@@ -59,8 +59,9 @@ struct Single<const N: usize, const G: usize, const MODEL: usize> {
 #[derive(Debug)]
 struct Alone<const N: usize, const G: usize> {
     steps: Steps,
-    /// Their number for each set, in the order of the recursion.
+    /// Their number for each set, in the order of the recursion, and the place of their `kappa`.
     counts: Vec<usize>,
+    places: Vec<Range<usize>>,
     kappa: Vec<f64>,
 }
 
@@ -87,9 +88,15 @@ impl<const N: usize, const G: usize, const MODEL: usize> Single<N, G, MODEL> {
             counts[set] -= n_blocks * cut.block() / STEP;
             Some(Parallel { set, gains, cut, n_blocks })
         });
-        let kappa = vec![0.0; steps.n_steps() * STEP];
-        let (alone, channels) = (Alone { steps, counts, kappa }, channels.clone());
-        Self { alone, parallel, channels, instructions }
+        let mut n_kappa = 0;
+        let places = counts.iter().map(|count| {
+            let first = n_kappa;
+            n_kappa += count * STEP;
+            first..n_kappa
+        });
+        let places = places.collect();
+        let alone = Alone { steps, counts, places, kappa: vec![0.0; n_kappa] };
+        Self { alone, parallel, channels: channels.clone(), instructions }
     }
 
     /// Solves with (`HELD`) or without a weight of the input.
@@ -136,7 +143,7 @@ impl<const N: usize, const G: usize> Alone<N, G> {
             let steps = end - self.counts[set]..end;
             end = steps.start;
             let (_, gains) = self.steps.set(set);
-            let kappa = &mut self.kappa;
+            let kappa = &mut self.kappa[self.places[set].clone()];
             fixed::backward::<N, STEP, G>(wide, gains, signals, run, &mut costate, steps, kappa);
         }
         (costate, end)
@@ -157,7 +164,8 @@ impl<const N: usize, const G: usize> Alone<N, G> {
             let steps = begin..begin + self.counts[set];
             begin = steps.end;
             let (_, gains) = self.steps.set(set);
-            fixed::forward::<N, STEP, G>(wide, gains, signals, run, &mut state, steps, &self.kappa);
+            let kappa = &self.kappa[self.places[set].clone()];
+            fixed::forward::<N, STEP, G>(wide, gains, signals, run, &mut state, steps, kappa);
         }
         state
     }

@@ -43,23 +43,21 @@ impl Steps {
     pub(super) fn new(gains: &Gains, samples: usize) -> Self {
         let mut steps = Self::empty(gains, samples);
         let mut product = Product::new(gains.sizes(), steps.sizes);
-        let n_samples = gains.n_samples();
-        let mut settled = None;
-        for step in (0..n_samples.div_ceil(samples)).rev() {
-            let first = step * samples;
-            let places = first..(first + samples).min(n_samples);
-            let is_settled = places.len() == samples
-                && gains.is_settled(places.start)
-                && gains.is_settled(places.end - 1);
-            if is_settled && let Some(set) = settled {
-                steps.counts[set] += 1;
-                continue;
+        let (n_samples, settled) = (gains.n_samples(), gains.settled_samples());
+        let mut step = n_samples.div_ceil(samples);
+        while step > 0 {
+            step -= 1;
+            let places = step * samples..((step + 1) * samples).min(n_samples);
+            let records: Vec<Record> = places.clone().map(|k| gains.at(k)).collect();
+            let mut count = 1;
+            if places.len() == samples && settled.start <= places.start && places.end <= settled.end
+            {
+                // All steps of these gains at once, however long the run is.
+                let first = settled.start.div_ceil(samples);
+                count += step - first;
+                step = first;
             }
-            if is_settled {
-                settled = Some(steps.counts.len());
-            }
-            let records: Vec<Record> = places.map(|k| gains.at(k)).collect();
-            steps.push(&mut product, &records);
+            steps.push(&mut product, &records, count);
         }
         for gains in [&mut steps.back, &mut steps.fore] {
             gains.resize(gains.len() + BEYOND, 0.0);
@@ -72,7 +70,7 @@ impl Steps {
         let record = gains.settled()?;
         let mut steps = Self::empty(gains, samples);
         let mut product = Product::new(gains.sizes(), steps.sizes);
-        steps.push(&mut product, &vec![record; samples]);
+        steps.push(&mut product, &vec![record; samples], 1);
         Some(steps)
     }
 
@@ -83,15 +81,15 @@ impl Steps {
         Self { sizes, samples, back: Vec::new(), fore: Vec::new(), counts: Vec::new() }
     }
 
-    /// Adds a set that serves one step.
-    fn push(&mut self, product: &mut Product, records: &[Record]) {
+    /// Adds a set that serves some steps.
+    fn push(&mut self, product: &mut Product, records: &[Record], count: usize) {
         let rows = rows(self.sizes.n, self.sizes.m);
         let (back, fore) = (self.back.len(), self.fore.len());
         self.back.resize(back + rows * self.sizes.columns(), 0.0);
         self.fore.resize(fore + rows * (self.sizes.n + self.sizes.m), 0.0);
         product.back(records, &mut self.back[back..]);
         product.fore(records, &mut self.fore[fore..]);
-        self.counts.push(1);
+        self.counts.push(count);
     }
 
     /// Returns the sizes of a step.
