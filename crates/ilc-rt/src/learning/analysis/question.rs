@@ -55,8 +55,8 @@ impl Default for Question {
 /// - `question.reference`: `n_samples` x `n_outputs`, time first
 /// # Real Time
 /// Cold path. `O(n^3)` in `n = n_samples n_inputs` up to [`DENSE_MAX`]; beyond, and for an optimal law
-/// on its own model without `rate`, uncertainty and noise, some hundred products of `O(n)`, and for a law without [adjoint](Law::apply_adjoint) up to [`COLUMNS_MAX`]
-/// `n` of them.
+/// on its own model without `rate`, uncertainty and noise, some hundred products of `O(n)`, and for a
+/// law without [adjoint](Law::apply_adjoint) up to [`COLUMNS_MAX`] `n` of them.
 /// # Errors
 /// - [`LearningError::NotLinear`] for a nonlinear law.
 /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Parameter`] for an
