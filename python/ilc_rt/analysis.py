@@ -63,7 +63,8 @@ class Analysis:
         Largest singular value of T, the worst factor of a run, and its uncertainty;
         None where it is not computed.
     transient_growth : float
-        Transient growth: largest growth of an error before it falls.
+        Transient growth: largest growth of an error before it falls; in long runs a lower
+        bound, at least the monotonic factor.
     critical_frequency_hz : float or None
         First frequency in Hz at which a run amplifies the error; None if there is none.
     learnable_frequency_hz : float or None

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use ilc_rt::library::{Elsewhere, Held, Library, LibraryError, Near, Page, Row, Task};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyIterator};
+use pythonize::pythonize;
 
 use crate::answer::{ByName, by_name, give_signal, give_vector};
 use crate::argument::{Signal, read_disturbance};
@@ -180,9 +180,7 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> ByName<'py> {
         [meta => n_axes, cycle_s, axis_names, input_units]
         disturbance: some(row.record.disturbance.clone()),
     );
-    let described = serde_json::to_string(&row.record.figures)
-        .map_err(|error| PyValueError::new_err(error.to_string()))?;
-    run.update(py.import("json")?.call_method1("loads", (described,))?.cast()?)?;
+    run.update(pythonize(py, &row.record.figures)?.cast()?)?;
     run.set_item("digest", &row.digest)?;
     Ok(run)
 }

@@ -50,8 +50,15 @@ impl Library {
     /// # Errors
     /// [`LibraryError::Sqlite`] if the file cannot be read.
     pub fn count(&self, cell: Option<&str>) -> Result<usize, LibraryError> {
-        let query = "SELECT count(*) FROM iteration WHERE ?1 IS NULL OR cell = ?1";
-        let count = self.connection.query_row(query, [cell], |row| row.get::<_, i64>(0));
+        let all = "SELECT count(*) FROM iteration";
+        let count = match cell {
+            // Counted in the smallest index.
+            None => self.connection.query_row(all, [], |row| row.get::<_, i64>(0)),
+            Some(cell) => {
+                self.connection
+                    .query_row(&format!("{all} WHERE cell = ?1"), [cell], |row| row.get(0))
+            }
+        };
         count.map(|n| usize::try_from(n).unwrap_or(0)).map_err(|source| self.fail(source))
     }
 

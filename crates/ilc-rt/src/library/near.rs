@@ -12,7 +12,8 @@ use std::collections::{BinaryHeap, HashSet};
 
 use rusqlite::{Connection, OptionalExtension, params};
 
-use super::row::numbers;
+use super::row::{as_integer, numbers};
+use super::schema;
 
 /// Numbers of a disturbance in a box; further ones are only compared afterwards.
 const NUMBERS: usize = 4;
@@ -49,9 +50,28 @@ pub(super) fn insert(
         .map(drop)
 }
 
-/// Deletes the box of a place.
-pub(super) fn delete(connection: &Connection, id: i64) -> rusqlite::Result<()> {
-    connection.prepare_cached("DELETE FROM near WHERE id = ?1")?.execute([id]).map(drop)
+/// Deletes the boxes of places that are no more.
+pub(super) fn delete(connection: &Connection, gone: &[i64]) -> rusqlite::Result<()> {
+    let most = "SELECT count(*) < ?1 FROM (SELECT 1 FROM place LIMIT ?1)";
+    if connection.query_row(most, [as_integer(gone.len())], |row| row.get(0))? {
+        return build(connection);
+    }
+    let mut delete = connection.prepare_cached("DELETE FROM near WHERE id = ?1")?;
+    gone.iter().try_for_each(|id| delete.execute([id]).map(drop))
+}
+
+/// Makes the tree of the places anew: one after the other, boxes are deleted more slowly than they
+/// are inserted.
+fn build(connection: &Connection) -> rusqlite::Result<()> {
+    connection.execute_batch("DROP TABLE near")?;
+    schema::create(connection)?;
+    let mut places = connection.prepare("SELECT id FROM place")?;
+    let ids: Vec<i64> = places.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
+    for id in ids {
+        let (cell, disturbance) = of_place(connection, id)?;
+        insert(connection, id, cell, &disturbance)?;
+    }
+    Ok(())
 }
 
 /// Reads cell and disturbance of a place.

@@ -1,5 +1,7 @@
 //! Parts that many runs share and the file has once: texts, set points, places of disturbances.
 
+use std::collections::BTreeSet;
+
 use rusqlite::{Connection, OptionalExtension, params};
 use sha2::{Digest, Sha256};
 
@@ -63,14 +65,18 @@ pub(super) fn cell_key(connection: &Connection, name: &str) -> rusqlite::Result<
         .optional()
 }
 
-/// Deletes a place if no run was made under it any more.
-pub(super) fn forget_place(connection: &Connection, id: i64) -> rusqlite::Result<()> {
-    let delete =
-        "DELETE FROM place WHERE id = ?1 AND NOT EXISTS (SELECT 1 FROM iteration WHERE place = ?1)";
-    if connection.prepare_cached(delete)?.execute([id])? > 0 {
-        near::delete(connection, id)?;
+/// Deletes those of some places under which no run was made any more.
+pub(super) fn forget_places(connection: &Connection, ids: &BTreeSet<i64>) -> rusqlite::Result<()> {
+    let mut delete = connection.prepare_cached(
+        "DELETE FROM place WHERE id = ?1 AND NOT EXISTS (SELECT 1 FROM iteration WHERE place = ?1)",
+    )?;
+    let mut gone = Vec::new();
+    for id in ids {
+        if delete.execute([id])? > 0 {
+            gone.push(*id);
+        }
     }
-    Ok(())
+    near::delete(connection, &gone)
 }
 
 /// Deletes set points if no run has them any more.

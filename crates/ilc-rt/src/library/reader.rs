@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 
@@ -16,19 +17,31 @@ use super::file::{BUSY_TIMEOUT, Found, beside, found, metadata, plain};
 /// Looks at a file, each of which a writer may have spoiled.
 pub(super) const LOOKS_MAX: u32 = 5;
 
+/// Age of a file whose next change certainly has another time: some file systems count in steps of
+/// two seconds.
+const SETTLED: Duration = Duration::from_secs(3);
+
 /// State of a file that is read without a lock, as no writer has left a log.
 #[derive(Debug)]
 pub(super) struct AtRest {
     path: PathBuf,
     identity: (u64, u64),
     size_and_time: (u64, i64, i64),
+    is_settled: bool,
 }
 
 impl AtRest {
     fn of(path: &Path, metadata: &Metadata) -> Self {
         let identity = (metadata.dev(), metadata.ino());
         let size_and_time = (metadata.len(), metadata.mtime(), metadata.mtime_nsec());
-        Self { path: path.to_owned(), identity, size_and_time }
+        let age = metadata.modified().map(|time| time.elapsed().unwrap_or_default());
+        let is_settled = age.is_ok_and(|age| age > SETTLED);
+        Self { path: path.to_owned(), identity, size_and_time, is_settled }
+    }
+
+    /// Whatever is written from now on changes the time of the file, so that it is noticed.
+    pub(super) fn is_settled(&self) -> bool {
+        self.is_settled
     }
 
     /// No writer has been there since.

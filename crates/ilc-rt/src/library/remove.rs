@@ -95,6 +95,6 @@ fn delete(connection: &Connection, ids: &[i64]) -> rusqlite::Result<()> {
         forget_run.execute([id])?;
         forget_signals.execute([id])?;
     }
-    places.into_iter().try_for_each(|place| once::forget_place(connection, place))?;
+    once::forget_places(connection, &places)?;
     references.into_iter().try_for_each(|reference| once::forget_reference(connection, reference))
 }

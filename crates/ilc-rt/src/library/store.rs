@@ -99,17 +99,32 @@ impl Library {
     /// As [`Library::read`], and those of the work.
     pub fn read_with<T>(
         path: &Path,
-        mut work: impl FnMut(&Self) -> Result<T, LibraryError>,
+        work: impl FnMut(&Self) -> Result<T, LibraryError>,
     ) -> Result<T, LibraryError> {
+        Self::read_and_keep(path, work).map(|(answer, _)| answer)
+    }
+
+    /// The same; also returns the library if it can be read from again as long as it [rests](Self::rests).
+    pub(super) fn read_and_keep<T>(
+        path: &Path,
+        mut work: impl FnMut(&Self) -> Result<T, LibraryError>,
+    ) -> Result<(T, Option<Self>), LibraryError> {
         let mut n_looks = 0;
         loop {
             n_looks += 1;
             let library = Self::read(path)?;
             let answer = work(&library);
-            if n_looks == LOOKS_MAX || library.at_rest.is_none_or(|at_rest| at_rest.lasts()) {
-                return answer;
+            let Some(at_rest) = &library.at_rest else { return Ok((answer?, None)) };
+            let (lasts, is_settled) = (at_rest.lasts(), at_rest.is_settled());
+            if lasts || n_looks == LOOKS_MAX {
+                return Ok((answer?, Some(library).filter(|_| lasts && is_settled)));
             }
         }
+    }
+
+    /// True if the file was read without a lock, and no writer has been there since.
+    pub(super) fn rests(&self) -> bool {
+        self.at_rest.as_ref().is_some_and(AtRest::lasts)
     }
 
     /// Opens a library in memory, deleted when dropped.

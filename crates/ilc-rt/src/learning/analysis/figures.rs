@@ -51,7 +51,8 @@ pub struct Analysis {
     /// [`COLUMNS_MAX`](super::COLUMNS_MAX).
     pub monotonic_factor: Option<Estimate>,
     /// Transient growth of the error before it falls: the largest norm of a power of `T` (with
-    /// [`Method::Structured`] the largest growth from a random start).
+    /// [`Method::Structured`] a lower bound: the larger of the monotonic factor and the growth of a
+    /// random error).
     pub transient_growth: f64,
     /// Frequencies of [`Analysis::contraction`]; empty for a time-varying law, or one whose impulse
     /// response is longer than the run.

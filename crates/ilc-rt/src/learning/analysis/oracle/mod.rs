@@ -305,6 +305,20 @@ fn long_runs_agree_with_short_ones_of_the_same_law() {
 }
 
 #[test]
+fn the_error_grows_at_least_as_much_as_in_the_worst_single_run() {
+    // Both sides of the limit of dense matrices, for laws whose random errors fall at once.
+    let model = axis(2e-3);
+    for n in [400, 700] {
+        for (name, mut law) in laws(&model, n) {
+            let found = analyze(law.as_mut(), &model, n, &Question::default()).unwrap();
+            let (growth, factor) = (found.transient_growth, found.monotonic_factor.unwrap());
+            assert!(growth >= factor.value.max(1.0), "{name}, {n}: {growth} {factor:?}");
+            assert!(name != "rate" || factor.value > 1.01, "{n}: {factor:?}");
+        }
+    }
+}
+
+#[test]
 fn a_long_run_of_a_filtered_law_ends_where_its_fixed_point_says() {
     let (model, n) = (axis(2e-3), 1300);
     let gains = PdGains { kp: 0.5, kd: 0.0, lead_samples: 8 };
