@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 
 use super::LearningError;
 use super::krylov::{Estimate, largest_in_order};
-use crate::model::StateSpace;
+use crate::model::{StateSpace, Stepper};
 
 /// Largest number of inputs for which the norm is always computed to [`TOLERANCE`].
 const SHORT: usize = 2000;
@@ -19,6 +19,7 @@ const TOLERANCE: f64 = 1e-12;
 /// Cold path. Allocates at creation, never in [`Operator::forward`] or [`Operator::transposed`].
 #[derive(Debug, Clone)]
 pub(crate) struct Operator {
+    forward: Stepper,
     a: DMatrix<f64>,
     b: DMatrix<f64>,
     c: DMatrix<f64>,
@@ -31,6 +32,7 @@ impl Operator {
     pub(crate) fn new(model: &StateSpace) -> Self {
         let n = model.n_states();
         Self {
+            forward: Stepper::new(model),
             a: model.a().clone(),
             b: model.b().clone(),
             c: model.c().clone(),
@@ -43,15 +45,9 @@ impl Operator {
     /// Simulates the model from rest: `x[k+1] = A x[k] + B u[k]`, `y[k] = C x[k] + D u[k]`.
     pub(crate) fn forward(&mut self, u: &[f64], y: &mut [f64]) {
         let (m, p) = (self.b.ncols(), self.c.nrows());
-        self.state.fill(0.0);
+        self.forward.start(None);
         for (u, y) in u.chunks_exact(m).zip(y.chunks_exact_mut(p)) {
-            let u = DVectorView::from_slice(u, m);
-            let mut y = DVectorViewMut::from_slice(y, p);
-            y.gemv(1.0, &self.c, &self.state, 0.0);
-            y.gemv(1.0, &self.d, &u, 1.0);
-            self.other.gemv(1.0, &self.a, &self.state, 0.0);
-            self.other.gemv(1.0, &self.b, &u, 1.0);
-            std::mem::swap(&mut self.state, &mut self.other);
+            self.forward.step(u, y);
         }
     }
 

@@ -1,9 +1,10 @@
 //! The linear time-invariant state-space model: simulation, Markov parameters, lifted system,
 //! poles.
 
-use nalgebra::{Complex, DMatrix, DVector, Schur};
+use nalgebra::{Complex, DMatrix, Schur};
 
 use super::ModelError;
+use super::rows::Stepper;
 
 /// Largest number of values of all Markov parameters together.
 const MAX_MARKOV: usize = 10_000_000;
@@ -167,31 +168,20 @@ impl StateSpace {
                 allowed: format!("a whole number of samples of {m} channels is needed"),
             });
         }
-        let n = self.n_states();
-        let mut x = match x0 {
-            None => DVector::zeros(n),
-            Some(x0) if x0.len() == n => DVector::from_column_slice(x0),
-            Some(x0) => {
-                return Err(ModelError::Length {
-                    what: "x0",
-                    found: x0.len(),
-                    allowed: format!("one value for each of the {n} states is needed"),
-                });
-            }
-        };
-        let mut output = Vec::with_capacity(input.len() / m * self.n_outputs());
-        // In place: allocating a vector for each product would take longer than the product.
-        let (mut next, mut u) = (DVector::zeros(n), DVector::zeros(m));
-        let mut y = DVector::zeros(self.n_outputs());
-        for sample in input.chunks_exact(m) {
+        let (n, p) = (self.n_states(), self.n_outputs());
+        if let Some(x0) = x0.filter(|x0| x0.len() != n) {
+            return Err(ModelError::Length {
+                what: "x0",
+                found: x0.len(),
+                allowed: format!("one value for each of the {n} states is needed"),
+            });
+        }
+        let mut stepper = Stepper::new(self);
+        stepper.start(x0);
+        let mut output = vec![0.0; input.len() / m * p];
+        for (u, y) in input.chunks_exact(m).zip(output.chunks_exact_mut(p.max(1))) {
             crate::interrupt::point();
-            u.copy_from_slice(sample);
-            y.gemv(1.0, &self.c, &x, 0.0);
-            y.gemv(1.0, &self.d, &u, 1.0);
-            output.extend_from_slice(y.as_slice());
-            next.gemv(1.0, &self.a, &x, 0.0);
-            next.gemv(1.0, &self.b, &u, 1.0);
-            std::mem::swap(&mut x, &mut next);
+            stepper.step(u, y);
         }
         if output.iter().all(|value| value.is_finite()) {
             Ok(output)
@@ -290,6 +280,8 @@ impl StateSpace {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DVector;
+
     use super::*;
 
     fn integrator() -> StateSpace {
