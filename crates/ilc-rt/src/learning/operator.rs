@@ -32,7 +32,7 @@ impl Operator {
     pub(crate) fn new(model: &StateSpace) -> Self {
         let n = model.n_states();
         Self {
-            forward: Stepper::new(model),
+            forward: Stepper::new([model.a(), model.b(), model.c(), model.d()]),
             a: model.a().clone(),
             b: model.b().clone(),
             c: model.c().clone(),

@@ -3,8 +3,6 @@
 
 use nalgebra::DMatrix;
 
-use super::StateSpace;
-
 /// The model at work on signals, with its state.
 ///
 /// Sums run along a row from its first column, so that zeros change no bit of them.
@@ -23,16 +21,11 @@ pub(crate) struct Stepper {
 }
 
 impl Stepper {
-    /// Creates it at rest.
-    pub(crate) fn new(model: &StateSpace) -> Self {
-        let now = vec![0.0; model.n_states() + model.n_inputs()];
-        Self {
-            moves: Rows::new(model.a(), model.b()),
-            shows: Rows::new(model.c(), model.d()),
-            next: now.clone(),
-            now,
-            n_states: model.n_states(),
-        }
+    /// Creates it at rest, of the model's `A`, `B`, `C`, `D`.
+    pub(crate) fn new([a, b, c, d]: [&DMatrix<f64>; 4]) -> Self {
+        let now = vec![0.0; b.nrows() + b.ncols()];
+        let (moves, shows) = (Rows::new(a, b), Rows::new(c, d));
+        Self { moves, shows, next: now.clone(), now, n_states: b.nrows() }
     }
 
     /// Sets the state: `n_states` numbers, or zero.
@@ -109,8 +102,7 @@ mod tests {
                 })
             };
             let (a, b, c, d) = (matrix(n, n) * 0.4, matrix(n, m), matrix(p, n), matrix(p, m));
-            let model = StateSpace::discrete(a.clone(), b.clone(), c.clone(), d.clone(), 1.0).unwrap();
-            let mut stepper = Stepper::new(&model);
+            let mut stepper = Stepper::new([&a, &b, &c, &d]);
             let mut x = DVector::from_fn(n, |i, _| values[i]);
             stepper.start(Some(x.as_slice()));
             let mut y = vec![0.0; p];

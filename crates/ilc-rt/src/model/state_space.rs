@@ -176,7 +176,7 @@ impl StateSpace {
                 allowed: format!("one value for each of the {n} states is needed"),
             });
         }
-        let mut stepper = Stepper::new(self);
+        let mut stepper = Stepper::new([&self.a, &self.b, &self.c, &self.d]);
         stepper.start(x0);
         let mut output = vec![0.0; input.len() / m * p];
         for (u, y) in input.chunks_exact(m).zip(output.chunks_exact_mut(p.max(1))) {

@@ -21,9 +21,13 @@ pub(super) struct Minimum {
 
 /// Minimises the squared residuals from `start` (Levenberg-Marquardt).
 ///
-/// Derivatives are central differences; parameters should be of the order of 1. Non-finite
-/// residuals count as infinitely bad.
-pub(super) fn minimize(start: &[f64], residuals: &dyn Fn(&[f64]) -> DVector<f64>) -> Minimum {
+/// Derivatives are central differences, except for those that are `constant`, each with its parameter;
+/// parameters should be of the order of 1. Non-finite residuals count as infinitely bad.
+pub(super) fn minimize(
+    start: &[f64],
+    constant: &[(usize, DVector<f64>)],
+    residuals: &dyn Fn(&[f64]) -> DVector<f64>,
+) -> Minimum {
     let size = |r: &DVector<f64>| {
         let cost = r.norm_squared();
         if cost.is_finite() { cost } else { f64::INFINITY }
@@ -31,7 +35,13 @@ pub(super) fn minimize(start: &[f64], residuals: &dyn Fn(&[f64]) -> DVector<f64>
     let mut x = DVector::from_column_slice(start);
     let mut r = residuals(x.as_slice());
     let (mut cost, mut damping) = (size(&r), 1e-3);
-    let mut jacobian = slopes(&x, &r, residuals);
+    let mut jacobian = DMatrix::zeros(r.len(), x.len());
+    for (i, slope) in constant {
+        jacobian.set_column(*i, slope);
+    }
+    let varying: Vec<usize> =
+        (0..x.len()).filter(|i| constant.iter().all(|(known, _)| known != i)).collect();
+    slopes(&x, &varying, residuals, &mut jacobian);
     for _ in 0..STEPS_MAX {
         crate::interrupt::point();
         let (gradient, normal) = (jacobian.tr_mul(&r), jacobian.tr_mul(&jacobian));
@@ -54,7 +64,7 @@ pub(super) fn minimize(start: &[f64], residuals: &dyn Fn(&[f64]) -> DVector<f64>
                 if decrease < DECREASE {
                     break;
                 }
-                jacobian = slopes(&x, &r, residuals);
+                slopes(&x, &varying, residuals, &mut jacobian);
             }
             _ => {
                 damping *= 4.0;
@@ -76,13 +86,14 @@ pub(super) fn minimize(start: &[f64], residuals: &dyn Fn(&[f64]) -> DVector<f64>
     Minimum { parameters: x.as_slice().to_vec(), cost, deviation }
 }
 
+/// Sets the columns of some parameters.
 fn slopes(
     x: &DVector<f64>,
-    r: &DVector<f64>,
+    varying: &[usize],
     residuals: &dyn Fn(&[f64]) -> DVector<f64>,
-) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(r.len(), x.len());
-    for i in 0..x.len() {
+    jacobian: &mut DMatrix<f64>,
+) {
+    for &i in varying {
         crate::interrupt::point();
         let h = 1e-6 * x[i].abs().max(1.0);
         let (mut up, mut down) = (x.clone(), x.clone());
@@ -91,7 +102,6 @@ fn slopes(
         let column = (residuals(up.as_slice()) - residuals(down.as_slice())) / (2.0 * h);
         jacobian.set_column(i, &column);
     }
-    jacobian
 }
 
 #[cfg(test)]
@@ -100,10 +110,13 @@ mod tests {
 
     #[test]
     fn the_valley_of_rosenbrock_ends_at_one() {
-        let found = minimize(&[-1.2, 1.0], &|x| {
-            DVector::from_column_slice(&[10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]])
-        });
-        assert!(found.cost < 1e-20);
-        assert!(found.parameters.iter().all(|x| (x - 1.0).abs() < 1e-9), "{found:?}");
+        let known = [(1, DVector::from_column_slice(&[10.0, 0.0]))];
+        for constant in [&[][..], &known] {
+            let found = minimize(&[-1.2, 1.0], constant, &|x| {
+                DVector::from_column_slice(&[10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]])
+            });
+            assert!(found.cost < 1e-20);
+            assert!(found.parameters.iter().all(|x| (x - 1.0).abs() < 1e-9), "{found:?}");
+        }
     }
 }

@@ -269,7 +269,7 @@ impl Problem {
             Fraction { numerator: c, denominator }
         };
         let x: Vec<f64> = start.iter().zip(&scales).map(|(c, scale)| c / scale).collect();
-        at(&minimize(&x, &|x| self.residuals(&at(x))).parameters)
+        at(&minimize(&x, &[], &|x| self.residuals(&at(x))).parameters)
     }
 
     fn residuals(&self, fraction: &Fraction) -> DVector<f64> {

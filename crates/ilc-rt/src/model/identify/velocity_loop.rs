@@ -129,7 +129,7 @@ pub fn fit_velocity_loop(
         if delay_s.is_none() {
             start.extend([0.0, 0.0]);
         }
-        let found = minimize(&start, &residuals);
+        let found = minimize(&start, &[], &residuals);
         if found.cost.is_finite() && best.as_ref().is_none_or(|least| found.cost < least.cost) {
             best = Some(found);
         }

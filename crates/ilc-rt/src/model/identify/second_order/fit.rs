@@ -91,10 +91,11 @@ pub fn fit_second_order(
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| starts[a].0.total_cmp(&starts[b].0));
     let all: f64 = fit.root_weight.iter().map(|weight| weight * weight).sum();
+    let constant = fit.constant_slopes();
     let mut ends: Vec<(Minimum, Sign)> = Vec::new();
     for &i in order.iter().take(FOLLOWED) {
         let sign = starts[i].1;
-        ends.push((minimize(&points[i], &|x| fit.residuals(x, sign)), sign));
+        ends.push((minimize(&points[i], &constant, &|x| fit.residuals(x, sign)), sign));
         if ends.last().is_some_and(|(end, _)| end.cost <= EXACT * all) {
             break;
         }
@@ -206,10 +207,23 @@ impl<'a> Fit<'a> {
         let shape = model.shape();
         for (k, weight) in self.root_weight.iter().enumerate() {
             let ratio = self.measured.response[k] / shape.at(self.measured.frequency_hz[k]);
-            residuals[2 * k] = weight * ratio.norm().ln();
+            residuals[2 * k] = weight * 0.5 * ratio.norm_sqr().ln();
             residuals[2 * k + 1] = weight * ratio.arg();
         }
         residuals
+    }
+
+    /// Returns the derivatives for `ln |K|` and `tau / tau_0`, the same everywhere.
+    fn constant_slopes(&self) -> Vec<(usize, DVector<f64>)> {
+        let weighted = |slope: &dyn Fn(f64) -> [f64; 2]| {
+            let pairs = self.root_weight.iter().zip(&self.measured.frequency_hz);
+            let all = pairs.flat_map(|(weight, f)| slope(*f).map(|slope| weight * slope));
+            DVector::from_iterator(2 * self.root_weight.len(), all)
+        };
+        let gain = self.known.gain.is_none().then(|| weighted(&|_| [-1.0, 0.0]));
+        let delay = self.known.delay_s.is_none();
+        let delay = delay.then(|| weighted(&|f| [0.0, TAU * f * self.tau_0]));
+        (2..).zip([gain, delay].into_iter().flatten()).collect()
     }
 
     fn result(&self, minimum: &Minimum, sign: Sign) -> SecondOrderFit {
