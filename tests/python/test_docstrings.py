@@ -44,46 +44,32 @@ def documented(name: str) -> Iterator[tuple[str, str]]:
                 yield f"{name}.{attribute}.{member}", inspect.getdoc(inner) or ""
 
 
-def examples() -> dict[str, str]:
-    """Return each docstring with an example, once for an object of several modules."""
-    by_text: dict[str, str] = {}
-    for name in modules():
-        for where, text in documented(name):
-            if ">>>" in text:
-                by_text.setdefault(text, where)
-    return {where: text for text, where in by_text.items()}
+def examples(name: str) -> dict[str, str]:
+    """Return each docstring of a module that has an example."""
+    return {where: text for where, text in documented(name) if ">>>" in text}
 
 
-EXAMPLES = examples()
-
-
-@pytest.mark.parametrize("where", EXAMPLES)
-def test_an_example_in_a_docstring_runs(
-    where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", modules())
+def test_the_examples_in_the_docstrings_of_a_module_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In a folder with the examples, with no imports but the example's own."""
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    monkeypatch.chdir(tmp_path)
-    module = importlib.import_module(
-        next(name for name in sorted(modules(), key=len, reverse=True) if where.startswith(name))
-    )
-    test = doctest.DocTestParser().get_doctest(
-        EXAMPLES[where], dict(vars(module)), where, None, None
-    )
-    said: list[str] = []
-    flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
-    found = doctest.DocTestRunner(optionflags=flags).run(test, out=said.append)
-    assert found.failed == 0, "".join(said)
-
-
-@pytest.mark.parametrize("where", EXAMPLES)
-def test_no_example_is_passed_over(where: str) -> None:
-    """Every example can run."""
-    assert "+SKIP" not in EXAMPLES[where]
+    """Each in a folder of its own with the examples, with no imports but its own."""
+    for number, (where, text) in enumerate(examples(name).items()):
+        assert "+SKIP" not in text, where
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "examples").symlink_to(ROOT / "examples")
+        monkeypatch.chdir(folder)
+        variables = dict(vars(importlib.import_module(name)))
+        test = doctest.DocTestParser().get_doctest(text, variables, where, None, None)
+        said: list[str] = []
+        flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+        found = doctest.DocTestRunner(optionflags=flags).run(test, out=said.append)
+        assert found.failed == 0, "".join(said)
 
 
 def test_there_are_examples() -> None:
-    """Examples of the compiled module and of the package are found."""
-    assert any(where.endswith(".NormOptimalIlc") for where in EXAMPLES)
-    assert any(where.startswith("ilc_rt.identify") for where in EXAMPLES)
-    assert len(EXAMPLES) > 40
+    """Examples of laws, of the package and of the compiled module are found."""
+    assert any(where.endswith(".NormOptimalIlc") for where in examples("ilc_rt.laws.norm_optimal"))
+    assert examples("ilc_rt.identify")
+    assert examples("ilc_rt._native")

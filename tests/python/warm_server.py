@@ -88,7 +88,10 @@ def command(request: dict, descriptors: list[int]) -> int:
 
 
 def end(code: int) -> None:
-    """End this process as Python does, but leave its modules alone: that takes longer than most commands."""
+    """End this process as Python does, but leave its modules alone.
+
+    Taking them apart takes longer than most commands.
+    """
     for thread in threading.enumerate():
         if thread is not threading.main_thread() and not thread.daemon:
             thread.join()

@@ -1,10 +1,10 @@
 //! The figures of the analysis from dense matrices, for short runs.
 
-use faer::Mat;
 use faer::linalg::solvers::Solve;
+use faer::{ColRef, Mat};
 
 use super::iteration::Iteration;
-use crate::learning::krylov::{Estimate, radius};
+use crate::learning::krylov::{Estimate, largest_symmetric, radius};
 use crate::learning::{LearningError, Result};
 
 /// The matrices of one iteration, without the inputs that do not affect convergence.
@@ -137,7 +137,7 @@ impl Dense {
                 break;
             }
             if bound_of_norm(&power) > largest {
-                largest = largest.max(largest_singular_value(&power)?);
+                largest = largest.max(norm_of(&power)?);
             }
             power = &power * &power;
         }
@@ -219,6 +219,28 @@ fn bound_of_norm(matrix: &Mat<f64>) -> f64 {
         columns = columns.max(sum);
     }
     matrix.norm_l2().min((columns * rows.into_iter().fold(0.0, f64::max)).sqrt())
+}
+
+/// Returns the largest singular value, from products with single vectors if a few hundred of them tell it.
+fn norm_of(matrix: &Mat<f64>) -> Result<f64> {
+    let n = matrix.ncols();
+    let square = largest_symmetric(
+        n,
+        &mut |x, out| {
+            let image = matrix * ColRef::from_slice(x);
+            let back = matrix.transpose() * image;
+            out.iter_mut().zip(back.iter()).for_each(|(out, value)| *out = *value);
+            Ok(())
+        },
+        60,
+        300,
+        1e-12,
+    )?;
+    if square.error <= 1e-11 * square.value {
+        Ok(square.value.sqrt())
+    } else {
+        largest_singular_value(matrix)
+    }
 }
 
 fn largest_singular_value(matrix: &Mat<f64>) -> Result<f64> {
