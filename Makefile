@@ -73,14 +73,15 @@ gallery: build ## The papers, computed again: docs/gallery, pages and figures
 	mkdir -p docs/gallery
 	$(BIN)/ilc reproduce all --json docs/gallery/figures.json --report docs/gallery
 
-# Every part waits a lot: they fill each other's gaps.
+# Every part waits a lot: they fill each other's gaps. The tests in Rust compute most and wait least, so they take what
+# the others leave.
 test: $(VENV)/.test $(VENV)/.docs ## Everything that can fail, on every transport
 	+$(MAKE) --no-print-directory --jobs 3 --keep-going test-rust test-python vcan
 
 test-rust: ## Rust tests
 	@if cargo nextest --version >/dev/null 2>&1; then set -x; \
-	  cargo nextest run --release --workspace --no-fail-fast; \
-	else set -x; cargo test --release --workspace --no-fail-fast; fi
+	  nice -n 3 cargo nextest run --release --workspace --no-fail-fast; \
+	else set -x; nice -n 3 cargo test --release --workspace --no-fail-fast; fi
 	cargo test --release --workspace --doc
 
 test-python: $(VENV)/.test $(VENV)/.docs ## Python tests
