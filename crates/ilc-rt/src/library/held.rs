@@ -7,7 +7,7 @@ use super::error::LibraryError;
 use super::file::IN_MEMORY;
 use super::store::Library;
 
-/// A library in memory, or a file that is opened for each operation; for reading, only if somebody has
+/// A library in memory, or a file that is opened for each operation; for reading, only after another program has
 /// written to it.
 #[derive(Debug)]
 pub enum Held {

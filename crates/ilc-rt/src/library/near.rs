@@ -60,8 +60,7 @@ pub(super) fn delete(connection: &Connection, gone: &[i64]) -> rusqlite::Result<
     gone.iter().try_for_each(|id| delete.execute([id]).map(drop))
 }
 
-/// Makes the tree of the places anew: one after the other, boxes are deleted more slowly than they
-/// are inserted.
+/// Creates the tree from the places that are left: deleting a box takes longer than inserting one.
 fn build(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch("DROP TABLE near")?;
     schema::create(connection)?;

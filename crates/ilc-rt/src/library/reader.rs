@@ -39,7 +39,7 @@ impl AtRest {
         Self { path: path.to_owned(), identity, size_and_time, is_settled }
     }
 
-    /// Whatever is written from now on changes the time of the file, so that it is noticed.
+    /// True if any later change gives the file another time, so that it is noticed.
     pub(super) fn is_settled(&self) -> bool {
         self.is_settled
     }
