@@ -31,6 +31,9 @@ settings.register_profile("fuzz", deadline=None, database=None, print_blob=True)
 settings.load_profile("fuzz" if "ILC_FUZZ_SEED" in os.environ else "fixed")
 
 
+# Thousands of tests, and all that they import, stay until the end: no search for garbage finds any.
+gc.disable()
+
 # The workers and hundreds of processes share the processors: threads of NumPy's library only cost.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -42,6 +45,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
     if session.config.getoption("numprocesses", None):
+        # This process collects no tests.
+        gc.enable()
         # The workers share one, whose start takes as long as that of four commands.
         server = Warm()
         os.environ[Warm.VARIABLE] = server.socket
@@ -50,10 +55,10 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Refuse to share costly fixtures out among the workers: each would make its own."""
-    # Thousands of tests and all that they import stay until the end: the search for garbage is to
-    # leave them out.
-    gc.collect()
+    # From now on there is garbage, but not among what is there already.
     gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
+    gc.enable()
     if not getattr(session.config.option, "loadgroup", False):
         return
     for item in session.items:
