@@ -26,7 +26,7 @@ IN_MEMORY = ":memory:"
 #: More runs than any library has.
 ALL = 2**31
 #: Runs that are deleted in one transaction: some tenths of a second.
-DELETED_AT_ONCE = 1000
+DELETED_AT_ONCE = 10_000
 
 
 class Library(Closing, _native.Library):
