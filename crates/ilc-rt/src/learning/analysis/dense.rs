@@ -121,12 +121,12 @@ impl Dense {
     /// Returns the largest norm among `T, T^2, T^4, ...`: the transient growth of the error; `factor` is the
     /// norm of `T`.
     pub(super) fn transient_growth(&self, factor: Estimate) -> Result<f64> {
-        const DOUBLINGS: usize = 10;
+        const DOUBLINGS: usize = 9;
         if factor.value <= 1.0 {
             return Ok(1.0);
         }
-        let mut power = self.t.clone();
-        let mut largest: f64 = 1.0;
+        let mut power = &self.t * &self.t;
+        let mut largest = factor.value;
         for _ in 0..DOUBLINGS {
             crate::interrupt::point();
             let size = power.norm_max() * power.nrows() as f64;

@@ -207,7 +207,7 @@ impl<'a> Fit<'a> {
         let shape = model.shape();
         for (k, weight) in self.root_weight.iter().enumerate() {
             let ratio = self.measured.response[k] / shape.at(self.measured.frequency_hz[k]);
-            residuals[2 * k] = weight * 0.5 * ratio.norm_sqr().ln();
+            residuals[2 * k] = weight * ratio.norm().ln();
             residuals[2 * k + 1] = weight * ratio.arg();
         }
         residuals
