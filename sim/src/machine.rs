@@ -12,7 +12,7 @@ use ilc_rt::fieldbus::cia402::State;
 use ilc_rt::fieldbus::transport::Responder;
 
 use crate::event::{Change, Event};
-use crate::node::{Dictionary, DriveNode, EncoderNode, Measured};
+use crate::node::{Dictionary, DriveNode, EncoderNode};
 use crate::plant::{Demand, Gantry, Mechanisms, Plant};
 use crate::script::{Happening, Script};
 
@@ -125,7 +125,8 @@ impl Machine {
             events: VecDeque::with_capacity(EVENTS_MAX),
             script: Script::new(cell),
         };
-        machine.measure();
+        machine.measure_axes();
+        machine.measure_tool();
         Ok(machine)
     }
 
@@ -150,6 +151,7 @@ impl Machine {
         for _ in 0..n_steps {
             self.step(out);
         }
+        self.measure_tool();
     }
 
     /// Cuts the power of a node: it sends no more frames, and its axis is braked. Returns true if
@@ -250,18 +252,18 @@ impl Machine {
         }
         self.plant.step(&self.demands, f64::from(self.step_us) * 1e-6);
         self.time_us += u64::from(self.step_us);
-        self.measure();
+        self.measure_axes();
         self.note_changes();
     }
 
-    fn measure(&mut self) {
+    fn measure_axes(&mut self) {
         for (number, axis) in self.axes.iter_mut().enumerate() {
-            axis.drive.measure(Measured {
-                position_m: self.plant.encoder_m(number),
-                velocity_m_s: self.plant.encoder_velocity_m_s(number),
-                force_n: self.plant.force_n(number),
-            });
+            axis.drive.measure(self.plant.measured(number));
         }
+    }
+
+    /// The encoder of the tool shows only what it is asked for, so that steps need not measure it.
+    fn measure_tool(&mut self) {
         if let Some(tool) = &mut self.tool {
             tool.encoder.measure([self.plant.tool_m(0), self.plant.tool_m(1)]);
         }

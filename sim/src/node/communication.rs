@@ -64,6 +64,9 @@ pub struct Communication {
     habits: Habits,
     /// An SDO answer that is due after some time.
     late_answer: Option<(Frame, u64)>,
+    /// Time that has passed without being counted, because nothing falls due within `rest_us`.
+    passed_us: u64,
+    rest_us: u64,
 }
 
 /// Habits of real drives that concern their communication.
@@ -104,6 +107,8 @@ impl Communication {
             emergencies,
             habits: Habits::default(),
             late_answer: None,
+            passed_us: 0,
+            rest_us: 0,
         })
     }
 
@@ -166,6 +171,16 @@ impl Communication {
         self.emergencies.take_last()
     }
 
+    /// Returns false for frames of others, and those that no node of this kind hears.
+    fn concerns(&self, frame: &Frame) -> bool {
+        let id = frame.id();
+        id == cob_id::NMT
+            || id & 0x780 == cob_id::HEARTBEAT
+            || self.is_question(frame)
+            || self.sync.has_identifier(id, &self.dictionary)
+            || self.pdos.has_receiver(id)
+    }
+
     /// Returns whether `frame` asks this node for an object, so that its values must be fresh.
     pub fn is_question(&self, frame: &Frame) -> bool {
         frame.id() == cob_id::of(cob_id::SDO_REQUEST, self.node)
@@ -173,6 +188,7 @@ impl Communication {
 
     /// Sends the boot-up message and becomes pre-operational.
     pub fn boot(&mut self, out: &mut dyn FnMut(Frame)) {
+        self.catch_up();
         out(Heartbeat { node: self.node, state: NmtState::BootUp }.encode());
         self.nmt = NmtState::PreOperational;
         self.heartbeats.restart_own();
@@ -180,6 +196,10 @@ impl Communication {
 
     /// Handles a frame from the bus.
     pub fn receive(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) -> Incoming {
+        if !self.concerns(frame) {
+            return Incoming::Nothing;
+        }
+        self.catch_up();
         if let Some((command, node)) = NmtCommand::decode(frame) {
             if node.is_none_or(|node| node == self.node) {
                 self.command(command, out);
@@ -230,30 +250,76 @@ impl Communication {
         self.pdos.transmit_at_sync(self.sync.counter(), &self.dictionary, out);
     }
 
-    /// Advances time: heartbeat, event-driven TPDOs, and timeouts.
-    pub fn advance(&mut self, elapsed_us: u64, out: &mut dyn FnMut(Frame)) -> Silence {
+    /// Lets time pass; returns true if something may be due, for [`attend`](Self::attend).
+    pub fn pass(&mut self, elapsed_us: u64) -> bool {
         if self.nmt == NmtState::BootUp {
-            return Silence::None;
+            return false;
         }
-        if self.heartbeats.is_due(elapsed_us, &self.dictionary) {
+        self.passed_us += elapsed_us;
+        self.passed_us >= self.rest_us
+    }
+
+    /// Does what is due: heartbeat, event-driven TPDOs, and timeouts.
+    pub fn attend(&mut self, out: &mut dyn FnMut(Frame)) -> Silence {
+        self.catch_up();
+        let silence = self.do_what_is_due(out);
+        self.rest_us = self.time_to_rest_us();
+        silence
+    }
+
+    /// Counts the time that has passed; the next step looks again for what is due.
+    fn catch_up(&mut self) {
+        let elapsed_us = std::mem::take(&mut self.passed_us);
+        self.rest_us = 0;
+        if elapsed_us == 0 {
+            return;
+        }
+        self.heartbeats.pass(elapsed_us, &self.dictionary);
+        if self.nmt != NmtState::Stopped {
+            self.sync.pass(elapsed_us, &self.dictionary);
+        }
+        self.emergencies.pass(elapsed_us);
+        if let Some((_, left_us)) = &mut self.late_answer {
+            *left_us = left_us.saturating_sub(elapsed_us);
+        }
+        if self.nmt == NmtState::Operational {
+            self.pdos.pass(elapsed_us);
+        }
+    }
+
+    /// Returns the time within which nothing falls due, unless a frame comes or an emergency happens.
+    fn time_to_rest_us(&self) -> u64 {
+        if self.emergencies.has_waiting() {
+            return 0;
+        }
+        let late_us = self.late_answer.as_ref().map_or(u64::MAX, |(_, left_us)| *left_us);
+        let is_operational = self.nmt == NmtState::Operational;
+        let pdo_us = if is_operational { self.pdos.rest_us() } else { u64::MAX };
+        let dictionary = &self.dictionary;
+        let services_us = self.heartbeats.rest_us(dictionary).min(self.sync.rest_us(dictionary));
+        services_us.min(late_us).min(pdo_us)
+    }
+
+    fn do_what_is_due(&mut self, out: &mut dyn FnMut(Frame)) -> Silence {
+        if self.heartbeats.take_due(&self.dictionary) {
             out(Heartbeat { node: self.node, state: self.nmt }.encode());
         }
         if self.nmt != NmtState::Stopped
-            && let Some(sync) = self.sync.advance(elapsed_us, &self.dictionary)
+            && let Some(sync) = self.sync.take_due(&self.dictionary)
         {
             out(sync);
         }
         let may_send = self.may_send_emergencies();
-        self.emergencies.advance(elapsed_us, may_send, &self.dictionary, out);
-        self.answer_late(elapsed_us, out);
+        self.emergencies.send_waiting(may_send, &self.dictionary, out);
+        self.answer_late(out);
         if self.nmt == NmtState::Operational {
-            self.pdos.transmit_events(elapsed_us, &self.dictionary, out);
-            if self.pdos.deadline_passed(elapsed_us) {
+            self.pdos.transmit_events(&self.dictionary, out);
+            if self.pdos.deadline_passed() {
                 self.emergency(emcy::CODE_RPDO_TIMEOUT, out);
                 return Silence::Command;
             }
         }
-        if self.heartbeats.controller_is_silent(elapsed_us, &self.dictionary) {
+        if self.heartbeats.controller_is_silent(&self.dictionary) {
             self.emergency(emcy::CODE_HEARTBEAT, out);
             match self.dictionary.number(self.slots.behaviour) {
                 0 => self.nmt = NmtState::PreOperational,
@@ -267,6 +333,7 @@ impl Communication {
 
     /// Sends an emergency message, unless stopped, and adds it to the history.
     pub fn emergency(&mut self, code: u16, out: &mut dyn FnMut(Frame)) {
+        self.catch_up();
         let may_send = self.may_send_emergencies();
         self.emergencies.report(code, may_send, &mut self.dictionary, out);
     }

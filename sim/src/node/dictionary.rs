@@ -137,13 +137,15 @@ pub struct Dictionary {
     entries: Vec<Entry>,
     /// Longest PDO, in bytes.
     payload_max: usize,
+    /// Number of changes of values.
+    version: u64,
 }
 
 impl Dictionary {
     /// Sorts the objects.
     pub fn new(mut entries: Vec<Entry>) -> Self {
         entries.sort_by_key(|entry| entry.address);
-        Self { entries, payload_max: PAYLOAD_MAX }
+        Self { entries, payload_max: PAYLOAD_MAX, version: 0 }
     }
 
     /// Sets the longest PDO, in bytes: 64 on a bus with CAN FD.
@@ -154,6 +156,11 @@ impl Dictionary {
     /// Returns the longest PDO, in bytes.
     pub fn payload_max(&self) -> usize {
         self.payload_max
+    }
+
+    /// Returns a number that differs after any value was set.
+    pub fn version(&self) -> u64 {
+        self.version
     }
 
     /// Returns all objects, in order.
@@ -212,6 +219,7 @@ impl Dictionary {
 
     /// Sets a value from inside the node, saturated to its type.
     pub fn set(&mut self, slot: Slot, number: i64) {
+        self.version += 1;
         let entry = &mut self.entries[slot.0];
         entry.value = entry.value.with_number(number);
     }
@@ -232,6 +240,7 @@ impl Dictionary {
 
     /// Stores a value from the bus and marks the object as written.
     pub fn store(&mut self, slot: Slot, value: Value) {
+        self.version += 1;
         let entry = &mut self.entries[slot.0];
         entry.value = value;
         entry.written = true;
@@ -270,6 +279,7 @@ impl Dictionary {
 
     /// Resets the objects from `first` to `last` to their power-on values.
     pub fn reset(&mut self, first: u16, last: u16) {
+        self.version += 1;
         for entry in &mut self.entries {
             if (first..=last).contains(&entry.address.index) {
                 entry.value = entry.power_on;

@@ -7,6 +7,7 @@ use ilc_rt::fieldbus::cia402::State;
 
 use super::communication::{Communication, Incoming, Silence};
 use super::dictionary::{Dictionary, Slot};
+use super::drive_mode::DriveMode;
 use super::drive_objects;
 use super::drive_slots::DriveSlots;
 use super::homing::Homing;
@@ -14,9 +15,10 @@ use super::motion::Motion;
 use super::positioning::Positioning;
 use super::profile_modes::Dwell;
 use super::state_machine::StateMachine;
+use super::step_objects::StepObjects;
 use super::switches::Switches;
 use super::units::Units;
-use crate::plant::Demand;
+use crate::plant::{Demand, Measured};
 
 /// Controlword that switches the power stage off.
 pub(super) const DISABLE_VOLTAGE: u16 = 0;
@@ -50,17 +52,6 @@ pub struct DriveParameters {
     pub quirks: Quirks,
     /// Longest payload of a frame on its bus, in bytes.
     pub payload_max: usize,
-}
-
-/// Measurements of the drive.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Measured {
-    /// Position of the encoder.
-    pub position_m: f64,
-    /// Velocity of the encoder.
-    pub velocity_m_s: f64,
-    /// Force of the motor.
-    pub force_n: f64,
 }
 
 /// A simulated drive.
@@ -98,6 +89,10 @@ pub struct DriveNode {
     pub(super) standing: Dwell,
     /// A limit changed the target of profile velocity.
     pub(super) is_clipped: bool,
+    /// Cached from the dictionary.
+    pub(super) step_objects: Option<StepObjects>,
+    /// Force added to those of the drive's own loops in the last step.
+    force_offset_n: f64,
 }
 
 impl DriveNode {
@@ -138,6 +133,8 @@ impl DriveNode {
             reached: Dwell::default(),
             standing: Dwell::default(),
             is_clipped: false,
+            step_objects: None,
+            force_offset_n: 0.0,
         })
     }
 
@@ -164,6 +161,12 @@ impl DriveNode {
     /// Returns the motor's force limit as a share, 0 to 1.
     pub fn force_share(&self) -> f64 {
         self.units.force_share()
+    }
+
+    /// Returns the force of 0x60B2, which the drive adds to its own loops while it follows a target
+    /// of position or velocity; as of the last step.
+    pub fn force_offset_n(&self) -> f64 {
+        self.force_offset_n
     }
 
     /// Takes the last emergency sent since the last call.
@@ -227,30 +230,40 @@ impl DriveNode {
 
     /// Advances by one step of the drive's own loop and returns the demand for its axis.
     pub fn step(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) -> Demand {
-        self.show_statusword();
-        match self.communication.advance(step_us.into(), out) {
-            Silence::None => {}
-            Silence::Command => self.fault(emcy::CODE_RPDO_TIMEOUT),
-            Silence::Heartbeat => self.on_connection_loss(emcy::CODE_HEARTBEAT, None),
+        if self.communication.pass(step_us.into()) {
+            // A PDO that is sent on a change may carry it.
+            self.show_statusword();
+            match self.communication.attend(out) {
+                Silence::None => {}
+                Silence::Command => self.fault(emcy::CODE_RPDO_TIMEOUT),
+                Silence::Heartbeat => self.on_connection_loss(emcy::CODE_HEARTBEAT, None),
+            }
         }
         let dt_s = f64::from(step_us) * 1e-6;
-        self.pursue(step_us);
+        let objects = self.step_objects();
+        self.pursue(objects.mode, step_us);
         // A ramp or a hold follows no target, and so none of its offsets.
-        let feedforward_m_s = if self.motion.follows_target() {
-            self.units.velocity_m_s(self.number(self.slots.velocity_offset))
+        let feedforward_m_s =
+            if self.motion.follows_target() { objects.velocity_offset_m_s } else { 0.0 };
+        let own_limits;
+        let limits = if objects.mode == Some(DriveMode::ProfileVelocity) {
+            own_limits = self.profile_limits();
+            &own_limits
         } else {
-            0.0
+            self.units.limits()
         };
         let demand = self.motion.step(
-            &self.motion_limits(),
+            limits,
             self.measured.position_m,
             self.measured.velocity_m_s,
             feedforward_m_s,
             dt_s,
         );
         self.end_ramp();
-        self.watch_following_error(step_us, out);
-        if self.machine.state() == State::Fault || self.is_braked() { Demand::Off } else { demand }
+        self.watch_following_error(objects.error_window, step_us, out);
+        self.force_offset_n =
+            if self.motion.follows_target() { objects.force_offset_n } else { 0.0 };
+        if self.state() == State::Fault || objects.is_braked { Demand::Off } else { demand }
     }
 
     fn on_nmt(&mut self, command: NmtCommand, out: &mut dyn FnMut(Frame)) {
@@ -297,6 +310,7 @@ impl DriveNode {
         let counts_per_m = self.parameters.counts_per_m;
         self.units = Units::read(dictionary, &self.slots, counts_per_m, self.home_m)
             .within(&self.parameters.switches);
+        self.step_objects = None;
     }
 
     pub(super) fn number(&self, slot: Slot) -> i64 {

@@ -92,15 +92,23 @@ impl Emergencies {
         self.send(dictionary, out);
     }
 
-    /// Lets time pass; a message that waited is sent.
-    pub(super) fn advance(
+    /// Lets time pass.
+    pub(super) fn pass(&mut self, elapsed_us: u64) {
+        self.since_us = self.since_us.map(|since_us| since_us.saturating_add(elapsed_us));
+    }
+
+    /// Returns whether a message waits for its time.
+    pub(super) fn has_waiting(&self) -> bool {
+        self.waiting.is_some()
+    }
+
+    /// Sends a message that waited, if its time has come.
+    pub(super) fn send_waiting(
         &mut self,
-        elapsed_us: u64,
         may_send: bool,
         dictionary: &Dictionary,
         out: &mut dyn FnMut(Frame),
     ) {
-        self.since_us = self.since_us.map(|since_us| since_us.saturating_add(elapsed_us));
         if may_send {
             self.send(dictionary, out);
         } else {

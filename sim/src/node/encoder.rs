@@ -94,7 +94,9 @@ impl EncoderNode {
 
     /// Advances time.
     pub fn step(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) {
-        self.communication.advance(step_us.into(), out);
+        if self.communication.pass(step_us.into()) {
+            self.communication.attend(out);
+        }
     }
 
     fn show(&mut self) {

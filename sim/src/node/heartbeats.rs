@@ -38,15 +38,38 @@ impl Heartbeats {
         self.controller_us = None;
     }
 
-    /// Lets time pass and returns true if this node must send its heartbeat now.
-    pub(super) fn is_due(&mut self, elapsed_us: u64, dictionary: &Dictionary) -> bool {
-        let period_us = u64::try_from(dictionary.number(self.producer_ms)).unwrap_or(0) * 1000;
+    /// Lets time pass; the watched node's counts while one is watched.
+    pub(super) fn pass(&mut self, elapsed_us: u64, dictionary: &Dictionary) {
         self.own_us += elapsed_us;
-        let is_due = period_us > 0 && self.own_us >= period_us;
+        if self.watched(dictionary).is_some() {
+            self.controller_us = self.controller_us.map(|since_us| since_us + elapsed_us);
+        }
+    }
+
+    /// Returns the time after which one of the two heartbeats is due; none is before.
+    pub(super) fn rest_us(&self, dictionary: &Dictionary) -> u64 {
+        let own_us =
+            self.period_us(dictionary).map(|period_us| period_us.saturating_sub(self.own_us));
+        let watched_us = self.controller_us.zip(self.watched(dictionary));
+        // It may be as late as its period.
+        let other_us =
+            watched_us.map(|(since_us, (_, period_us))| (period_us + 1).saturating_sub(since_us));
+        own_us.unwrap_or(u64::MAX).min(other_us.unwrap_or(u64::MAX))
+    }
+
+    /// Returns true if this node must send its heartbeat now, and begins the next period.
+    pub(super) fn take_due(&mut self, dictionary: &Dictionary) -> bool {
+        let is_due = self.period_us(dictionary).is_some_and(|period_us| self.own_us >= period_us);
         if is_due {
             self.own_us = 0;
         }
         is_due
+    }
+
+    /// Returns the period of this node's own heartbeat, 0x1017.
+    fn period_us(&self, dictionary: &Dictionary) -> Option<u64> {
+        let period_ms = u64::try_from(dictionary.number(self.producer_ms)).unwrap_or(0);
+        (period_ms > 0).then_some(period_ms * 1000)
     }
 
     /// Notes the heartbeat of the watched node.
@@ -57,19 +80,16 @@ impl Heartbeats {
         }
     }
 
-    /// Counts the silence of the watched node; each one is reported once.
-    pub(super) fn controller_is_silent(
-        &mut self,
-        elapsed_us: u64,
-        dictionary: &Dictionary,
-    ) -> bool {
+    /// Returns whether the watched node has been silent for too long; each silence is reported once.
+    pub(super) fn controller_is_silent(&mut self, dictionary: &Dictionary) -> bool {
         let (Some(since_us), Some((_, period_us))) = (self.controller_us, self.watched(dictionary))
         else {
             return false;
         };
-        let since_us = since_us + elapsed_us;
         let is_silent = since_us > period_us;
-        self.controller_us = (!is_silent).then_some(since_us);
+        if is_silent {
+            self.controller_us = None;
+        }
         is_silent
     }
 

@@ -5,7 +5,7 @@
 //! `eds`.
 //!
 //! Family: `communication`, `drive`, `drive_objects`, `drive_slots`, `positioning`, `profile_modes`,
-//! `profile_objects` and `units`: the dictionary of a drive holds the parameters of its modes.
+//! `profile_objects`, `step_objects` and `units`: the dictionary of a drive holds the parameters of its modes.
 
 pub mod communication;
 pub mod dictionary;
@@ -30,6 +30,7 @@ pub mod sdo_server;
 mod shown;
 pub mod standard_objects;
 pub mod state_machine;
+mod step_objects;
 pub mod switches;
 mod sync_service;
 mod target;
@@ -37,5 +38,5 @@ pub mod units;
 pub mod value;
 
 pub use dictionary::Dictionary;
-pub use drive::{DriveNode, DriveParameters, Measured};
+pub use drive::{DriveNode, DriveParameters};
 pub use encoder::EncoderNode;

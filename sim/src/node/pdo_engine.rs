@@ -109,6 +109,15 @@ impl Pdo {
     fn is_synchronous(&self) -> bool {
         self.transmission <= SYNCHRONOUS_MAX
     }
+
+    fn is_event_driven(&self) -> bool {
+        self.cob_id.is_some() && !self.is_synchronous()
+    }
+
+    /// Returns the time after which its sender counts as silent, if it has promised to be cyclic.
+    fn deadline_us(&self) -> Option<u64> {
+        (self.event_ms > 0).then_some(u64::from(self.event_ms) * 1000)
+    }
 }
 
 /// Meaning of a frame to the process data.
@@ -127,6 +136,8 @@ pub enum Received {
 /// The eight PDOs of a node.
 #[derive(Clone, Copy, Debug)]
 pub struct PdoEngine {
+    /// Identifiers of the RPDOs, side by side: every frame on the bus is compared with them.
+    received: [Option<u16>; 4],
     receive: [Pdo; 4],
     transmit: [Pdo; 4],
     has_excess: bool,
@@ -135,13 +146,18 @@ pub struct PdoEngine {
 impl PdoEngine {
     /// Reads all parameters.
     pub fn new(dictionary: &Dictionary) -> Self {
-        let mut engine =
-            Self { receive: [Pdo::EMPTY; 4], transmit: [Pdo::EMPTY; 4], has_excess: false };
+        let mut engine = Self {
+            received: [None; 4],
+            receive: [Pdo::EMPTY; 4],
+            transmit: [Pdo::EMPTY; 4],
+            has_excess: false,
+        };
         for offset in 0..4_u8 {
             let at = usize::from(offset);
             engine.receive[at] = Pdo::load(dictionary, PdoNumber::receive(offset));
             engine.transmit[at] = Pdo::load(dictionary, PdoNumber::transmit(offset));
         }
+        engine.received = engine.receive.map(|pdo| pdo.cob_id);
         engine
     }
 
@@ -220,20 +236,37 @@ impl PdoEngine {
         }
     }
 
+    /// Lets time pass.
+    pub fn pass(&mut self, elapsed_us: u64) {
+        let sent = self.transmit.iter_mut().filter(|pdo| pdo.is_event_driven());
+        for pdo in sent.chain(self.receive.iter_mut().filter(|pdo| pdo.event_ms > 0)) {
+            pdo.since_us = pdo.since_us.map(|since_us| since_us + elapsed_us);
+        }
+    }
+
+    /// Returns the time after which a PDO is sent or overdue; none is before.
+    pub fn rest_us(&self) -> u64 {
+        // These may be sent whenever an object changes.
+        if self.transmit.iter().any(Pdo::is_event_driven) {
+            return 0;
+        }
+        let left_us = |pdo: &Pdo| Some((pdo.deadline_us()? + 1).saturating_sub(pdo.since_us?));
+        self.receive.iter().filter_map(left_us).min().unwrap_or(u64::MAX)
+    }
+
+    /// Returns whether an RPDO has this identifier.
+    pub fn has_receiver(&self, cob_id: u16) -> bool {
+        self.received.contains(&Some(cob_id))
+    }
+
     /// Sends the event-driven TPDOs that changed or whose timer expired.
-    pub fn transmit_events(
-        &mut self,
-        elapsed_us: u64,
-        dictionary: &Dictionary,
-        out: &mut dyn FnMut(Frame),
-    ) {
+    pub fn transmit_events(&mut self, dictionary: &Dictionary, out: &mut dyn FnMut(Frame)) {
         for pdo in &mut self.transmit {
             let Some(cob_id) = pdo.cob_id else { continue };
             if pdo.is_synchronous() {
                 continue;
             }
-            let since_us = pdo.since_us.map(|since| since + elapsed_us);
-            pdo.since_us = since_us;
+            let since_us = pdo.since_us;
             if since_us.is_some_and(|since| since < pdo.inhibit_us) {
                 continue;
             }
@@ -248,15 +281,15 @@ impl PdoEngine {
         }
     }
 
-    /// Counts time and tells whether an RPDO with a deadline is overdue; each silence is reported once.
-    pub fn deadline_passed(&mut self, elapsed_us: u64) -> bool {
+    /// Returns whether an RPDO with a deadline is overdue; each silence is reported once.
+    pub fn deadline_passed(&mut self) -> bool {
         let mut passed = false;
         for pdo in &mut self.receive {
-            let (Some(since_us), 1..) = (pdo.since_us, pdo.event_ms) else { continue };
-            let since_us = since_us + elapsed_us;
-            let is_late = since_us > u64::from(pdo.event_ms) * 1000;
-            passed |= is_late;
-            pdo.since_us = (!is_late).then_some(since_us);
+            let deadline_us = pdo.deadline_us().unwrap_or(u64::MAX);
+            if pdo.since_us.is_some_and(|since_us| since_us > deadline_us) {
+                pdo.since_us = None;
+                passed = true;
+            }
         }
         passed
     }

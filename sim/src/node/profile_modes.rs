@@ -79,14 +79,14 @@ impl DriveNode {
     }
 
     /// Makes the drive's own motion for the next step.
-    pub(super) fn pursue(&mut self, step_us: u32) {
+    pub(super) fn pursue(&mut self, mode: Option<DriveMode>, step_us: u32) {
         let now_m = self.measured.position_m;
         let before_m = std::mem::replace(&mut self.seen_m, now_m);
         if self.state() != State::OperationEnabled {
             self.drop_own_motion();
             return;
         }
-        match self.mode() {
+        match mode {
             Some(DriveMode::ProfilePosition) => {
                 self.pursue_set_points();
                 let window = self.number(self.slots.position_window);
@@ -155,12 +155,9 @@ impl DriveNode {
         self.motion.pursue(Goal::Speed { velocity_m_s }, law);
     }
 
-    /// Returns the limits of the next step: in profile velocity with the accelerations of the profile.
-    pub(super) fn motion_limits(&self) -> MotionLimits {
+    /// Returns the limits in profile velocity: with the accelerations of the profile.
+    pub(super) fn profile_limits(&self) -> MotionLimits {
         let limits = *self.units.limits();
-        if self.mode() != Some(DriveMode::ProfileVelocity) {
-            return limits;
-        }
         let law = self.units.profile();
         MotionLimits {
             acceleration_max_m_s2: law.acceleration_m_s2,

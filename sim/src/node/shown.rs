@@ -2,9 +2,10 @@
 
 use ilc_rt::fieldbus::cia402::{State, Statusword};
 
-use super::drive::{DriveNode, Measured};
+use super::drive::DriveNode;
 use super::drive_mode::DriveMode;
 use super::drive_objects::rounded;
+use crate::plant::Measured;
 
 /// Bit 10 of the statusword: the target is reached.
 const TARGET_REACHED: u16 = 1 << 10;

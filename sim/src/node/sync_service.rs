@@ -70,10 +70,14 @@ impl SyncService {
         self.counter
     }
 
+    /// Returns whether a frame with this identifier is a SYNC.
+    pub(super) fn has_identifier(&self, cob_id: u16, dictionary: &Dictionary) -> bool {
+        i64::from(cob_id) == dictionary.number(self.cob_id) & IDENTIFIER
+    }
+
     /// Interprets a frame.
     pub(super) fn hear(&mut self, frame: &Frame, dictionary: &Dictionary) -> Heard {
-        let identifier = dictionary.number(self.cob_id) & IDENTIFIER;
-        if i64::from(frame.id()) != identifier || frame.payload().len() > 1 {
+        if !self.has_identifier(frame.id(), dictionary) || frame.payload().len() > 1 {
             return Heard::Foreign;
         }
         if dictionary.number(self.overflow) != 0 && frame.payload().is_empty() {
@@ -88,16 +92,28 @@ impl SyncService {
         }
     }
 
-    /// Lets time pass and returns the SYNC that this node must produce now.
-    pub(super) fn advance(&mut self, elapsed_us: u64, dictionary: &Dictionary) -> Option<Frame> {
+    /// Returns the period of the SYNC that this node produces, if it does.
+    fn own_period_us(&self, dictionary: &Dictionary) -> Option<u64> {
         let produces = dictionary.number(self.cob_id) & PRODUCER != 0;
         let period_us = u64::try_from(dictionary.number(self.period_us)).unwrap_or(0);
-        if !produces || period_us == 0 {
-            self.since_us = 0;
-            return None;
-        }
-        self.since_us += elapsed_us;
-        if self.since_us < period_us {
+        (produces && period_us > 0).then_some(period_us)
+    }
+
+    /// Lets time pass.
+    pub(super) fn pass(&mut self, elapsed_us: u64, dictionary: &Dictionary) {
+        let produces = self.own_period_us(dictionary).is_some();
+        self.since_us = if produces { self.since_us + elapsed_us } else { 0 };
+    }
+
+    /// Returns the time after which this node must produce a SYNC; none is due before.
+    pub(super) fn rest_us(&self, dictionary: &Dictionary) -> u64 {
+        let period_us = self.own_period_us(dictionary);
+        period_us.map_or(u64::MAX, |period_us| period_us.saturating_sub(self.since_us))
+    }
+
+    /// Returns the SYNC that this node must produce now.
+    pub(super) fn take_due(&mut self, dictionary: &Dictionary) -> Option<Frame> {
+        if self.since_us < self.own_period_us(dictionary)? {
             return None;
         }
         self.since_us = 0;

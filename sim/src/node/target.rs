@@ -6,11 +6,7 @@ use ilc_rt::fieldbus::cia402::{InputKind, State};
 
 use super::drive::DriveNode;
 use super::drive_mode::DriveMode;
-use super::drive_objects::rounded;
 use super::homing::Homing;
-
-/// Value of the window that disables the following-error monitor.
-const WINDOW_OFF: i64 = 0xFFFF_FFFF;
 
 impl DriveNode {
     pub(super) fn forget_targets(&mut self) {
@@ -66,20 +62,8 @@ impl DriveNode {
         }
     }
 
-    /// Returns the force of 0x60B2, which the drive adds to its own loops while it follows a target
-    /// of position or velocity.
-    pub fn force_offset_n(&self) -> f64 {
-        if self.motion.follows_target()
-            && matches!(self.mode(), Some(DriveMode::Cyclic(mode)) if !mode.targets_torque())
-        {
-            self.force_n(self.number(self.slots.torque_offset))
-        } else {
-            0.0
-        }
-    }
-
     /// Converts thousandths of the rated torque.
-    fn force_n(&self, thousandths: i64) -> f64 {
+    pub(super) fn force_n(&self, thousandths: i64) -> f64 {
         // A reversed motor turns the other way for the same torque.
         let force_max_n = self.parameters.force_max_n.copysign(self.parameters.counts_per_m);
         thousandths as f64 * 1e-3 * force_max_n
@@ -115,12 +99,17 @@ impl DriveNode {
         }
     }
 
-    pub(super) fn watch_following_error(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) {
-        let window = self.number(self.slots.error_window);
-        let watched = self.state() == State::OperationEnabled
-            && self.controls_position()
-            && window != WINDOW_OFF;
-        if !watched || rounded(self.following_error_counts()).abs() <= window {
+    /// Monitors the following error; `None` for no window.
+    pub(super) fn watch_following_error(
+        &mut self,
+        window: Option<i64>,
+        step_us: u32,
+        out: &mut dyn FnMut(Frame),
+    ) {
+        let window = window.filter(|_| self.state() == State::OperationEnabled);
+        // Half a count more would be rounded to the next one.
+        let is_outside = |window: i64| self.following_error_counts().abs() >= window as f64 + 0.5;
+        if !window.is_some_and(is_outside) {
             self.astray_us = 0;
             return;
         }
@@ -137,14 +126,6 @@ impl DriveNode {
     pub(super) fn following_error_counts(&self) -> f64 {
         let demand_m = self.motion.demand_m().unwrap_or(self.measured.position_m);
         self.units.distance(demand_m - self.measured.position_m)
-    }
-
-    fn controls_position(&self) -> bool {
-        match self.mode() {
-            Some(DriveMode::ProfilePosition | DriveMode::Homing) => true,
-            Some(DriveMode::Cyclic(mode)) => mode.targets_position(),
-            Some(DriveMode::ProfileVelocity) | None => false,
-        }
     }
 
     pub(super) fn mode(&self) -> Option<DriveMode> {

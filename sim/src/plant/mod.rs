@@ -42,6 +42,17 @@ pub enum Demand {
     },
 }
 
+/// Measurements of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Measured {
+    /// Position of the encoder.
+    pub position_m: f64,
+    /// Velocity of the encoder.
+    pub velocity_m_s: f64,
+    /// Force of the motor.
+    pub force_n: f64,
+}
+
 /// Axes with encoders, motors and a tool.
 pub trait Plant: Send {
     /// Returns the number of axes.
@@ -60,6 +71,14 @@ pub trait Plant: Send {
     fn encoder_velocity_m_s(&self, axis: usize) -> f64;
     /// Returns the force of the motor during the last step.
     fn force_n(&self, axis: usize) -> f64;
+    /// Returns all that the drive of an axis measures.
+    fn measured(&self, axis: usize) -> Measured {
+        Measured {
+            position_m: self.encoder_m(axis),
+            velocity_m_s: self.encoder_velocity_m_s(axis),
+            force_n: self.force_n(axis),
+        }
+    }
     /// Returns a coordinate of the tool centre point.
     fn tool_m(&self, axis: usize) -> f64;
 }

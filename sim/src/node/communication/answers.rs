@@ -51,11 +51,8 @@ impl Communication {
         }
     }
 
-    pub(super) fn answer_late(&mut self, elapsed_us: u64, out: &mut dyn FnMut(Frame)) {
-        let Some((answer, left_us)) = self.late_answer else { return };
-        let left_us = left_us.saturating_sub(elapsed_us);
-        self.late_answer = (left_us > 0).then_some((answer, left_us));
-        if left_us == 0 {
+    pub(super) fn answer_late(&mut self, out: &mut dyn FnMut(Frame)) {
+        if let Some((answer, _)) = self.late_answer.take_if(|(_, left_us)| *left_us == 0) {
             out(answer);
         }
     }

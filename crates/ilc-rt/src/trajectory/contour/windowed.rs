@@ -99,15 +99,19 @@ impl<'a, const N: usize> Path<'a, N> {
         let mut best_m = self.to_sample_m(point_m, k);
         let mut at = k;
         while at < last {
-            best_m = best_m.min(self.to_segment_m(point_m, at));
-            at += 1;
-            at = at.saturating_add(self.samples_to_skip(point_m, at, best_m));
+            let n_far = self.samples_to_skip(point_m, at, best_m);
+            if n_far == 0 {
+                best_m = best_m.min(self.to_segment_m(point_m, at));
+            }
+            at = at.saturating_add(n_far.max(1));
         }
         let mut at = k;
         while at > first {
-            best_m = best_m.min(self.to_segment_m(point_m, at - 1));
-            at -= 1;
-            at = at.saturating_sub(self.samples_to_skip(point_m, at, best_m));
+            let n_far = self.samples_to_skip(point_m, at, best_m);
+            if n_far == 0 {
+                best_m = best_m.min(self.to_segment_m(point_m, at - 1));
+            }
+            at = at.saturating_sub(n_far.max(1));
         }
         best_m
     }
