@@ -79,12 +79,12 @@ class ConstrainedIlc(Law):
 
     The next input exceeds no bound by more than 1e-9 of its size. If no such input is found,
     `update` returns the input of the run and `status` gives the reason. The solver is a primal-dual
-    interior-point method with a Riccati recursion for its linear systems, warm-started from the
-    last solution.
+    interior-point method with a Riccati recursion for its linear systems; near the optimum, and
+    from the last solution on, it solves with the active bounds as equations.
 
     References
     ----------
-    [haas2016], section 4; [mehrotra1992]; [rao1998].
+    [haas2016], section 4; [mehrotra1992]; [rao1998]; [hintermueller2002].
 
     Examples
     --------

@@ -31,6 +31,7 @@ impl<const M: usize, const NS: usize> Gain<M, NS> {
     }
 
     /// Factorises `H`; directions without cost are left out.
+    #[inline(always)]
     pub(super) fn factorise(&mut self, h: &[[f64; M]; M]) {
         for j in 0..M {
             let mut pivot = h[j][j];

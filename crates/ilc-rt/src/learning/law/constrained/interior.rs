@@ -6,11 +6,14 @@ use super::riccati::{Plant, Pull, Weighing};
 use super::rows::Rows;
 use super::solver::{Bands, Outcome, Places, Solver};
 use crate::learning::sweep::Run;
+use crate::learning::sweep::wide::Instructions;
 
 /// Duality gap at which the search ends, relative to the cost ...
 const GAP: f64 = 3e-14;
+/// ... the one at which the active bounds are known, so that the rest is solved with them as equations ...
+const GAP_FINISH: f64 = 1e-7;
 /// ... and the accepted one if rounding prevents a smaller one.
-const GAP_ENOUGH: f64 = 1e-9;
+pub(super) const GAP_ENOUGH: f64 = 1e-9;
 /// An iteration that reduces the gap by less than this factor is limited by rounding.
 const STALLED: f64 = 0.9;
 /// Part of the cost before learning that counts as zero.
@@ -42,6 +45,7 @@ const WARM_START: f64 = 0.1;
 #[derive(Debug)]
 pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const NS: usize> {
     pub(super) plant: Plant<N, M, P>,
+    pub(super) instructions: Instructions,
     /// The distinct weights, and their index at each sample.
     pub(super) weighings: Vec<Weighing<M, P>>,
     pub(super) which: Vec<usize>,
@@ -100,6 +104,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         ]);
         let mut interior = Self {
             plant,
+            instructions: Instructions::best(),
             weighings,
             which,
             holds,
@@ -154,6 +159,31 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         std::mem::swap(&mut self.plain, &mut self.gains);
     }
 
+    /// Returns the cost below which it counts as zero.
+    pub(super) fn least_cost(&self) -> f64 {
+        FLOOR * self.worth
+    }
+
+    /// Keeps the present point, to return to it.
+    fn keep(&mut self) {
+        self.rows.keep(&self.stiffness_of_rows());
+        for (k, last) in self.last.iter_mut().enumerate() {
+            for (i, last) in last.iter_mut().enumerate() {
+                *last = self.input[k][i] + self.v[k][i];
+            }
+        }
+    }
+
+    /// Goes to the last solution, as a change of this run's input.
+    fn return_to_last(&mut self) {
+        for (k, v) in self.v.iter_mut().enumerate() {
+            for (i, v) in v.iter_mut().enumerate() {
+                *v = self.last[k][i] - self.input[k][i];
+            }
+        }
+        self.roll();
+    }
+
     /// Iterates from the current slacks and multipliers.
     ///
     /// A careful search takes more iterations, and converges where corrections alone do not: about
@@ -165,6 +195,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         let mut found = (false, 0, f64::INFINITY);
         let mut part = 1.0_f64;
         let (mut low, mut since, mut is_lost) = (gap, 0, false);
+        let mut may_finish = true;
         self.look();
         let most = if is_careful { MAX_CAREFUL_ITERATIONS } else { MAX_ITERATIONS };
         for iteration in 1..=most {
@@ -195,7 +226,18 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             since = if gap < STALLED * low { 0 } else { since + 1 };
             low = low.min(gap);
             is_lost |= since >= LOST;
-            part = gap / self.cost.max(FLOOR * self.worth);
+            part = gap / self.cost.max(self.least_cost());
+            if may_finish && residual.max(part) <= GAP_FINISH {
+                may_finish = false;
+                self.keep();
+                let finished = self.pin();
+                if finished.0 {
+                    return (true, iteration + finished.1, finished.2);
+                }
+                self.return_to_last();
+                self.rows.restore_kept();
+                self.look();
+            }
             let is_done = residual <= RESIDUAL && part <= GAP_ENOUGH;
             found = (is_done, iteration, part);
             if is_done && (part <= GAP || gap > STALLED * before) {
@@ -216,19 +258,20 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
         if !self.rows.fit() {
             // A cost caused by the bounds alone counts as well.
             let stiffness = self.plain[0].stiffness();
-            let overshoot = self.rows.overshoot(|_| 1.0);
+            let overshoot = self.rows.overshoot(&[1.0; 4]);
             self.worth = self.cost_before + 0.5 * stiffness * overshoot * overshoot;
             let centre = self.worth / self.rows.count();
             let mut found = (false, 0, 0.0);
             if self.has_last {
-                for (k, v) in self.v.iter_mut().enumerate() {
-                    for (i, v) in v.iter_mut().enumerate() {
-                        *v = self.last[k][i] - self.input[k][i];
-                    }
+                self.return_to_last();
+                found = self.pin();
+                if !found.0 {
+                    let wasted = found.1;
+                    self.return_to_last();
+                    self.rows.start(WARM_START * centre, true);
+                    found = self.search(false);
+                    found.1 += wasted;
                 }
-                self.roll();
-                self.rows.start(WARM_START * centre, true);
-                found = self.search(false);
             }
             for is_careful in [false, true] {
                 if !found.0 {
@@ -245,11 +288,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
         outcome.is_solved &= self.vet();
         self.has_last &= outcome.is_solved;
         if self.has_last {
-            for (k, last) in self.last.iter_mut().enumerate() {
-                for (i, last) in last.iter_mut().enumerate() {
-                    *last = self.input[k][i] + self.v[k][i];
-                }
-            }
+            self.keep();
         }
         outcome
     }

@@ -83,7 +83,6 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     /// Clips rounding errors at the bounds of input and change; returns true if all bounds hold
     /// then.
     pub(super) fn vet(&mut self) -> bool {
-        let mut largest = 0.0_f64;
         for (k, v) in self.v.iter_mut().enumerate() {
             for (i, v) in v.iter_mut().enumerate() {
                 let u = self.input[k][i];
@@ -91,24 +90,28 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
                     let (low, high) = band.at(k * M + i);
                     *v = v.max(low - u).min(high - u);
                 }
-                largest = largest.max((u + *v).abs());
             }
         }
         self.roll();
+        self.rows.overshoot(&self.sizes()) <= EXCESS
+    }
+
+    /// Returns the size of the limits of each kind as they were given, or that of the input.
+    pub(super) fn sizes(&self) -> [f64; 4] {
+        let largest = |most: f64, k: usize| {
+            let next = |i: usize| (self.input[k][i] + self.v[k][i]).abs();
+            (0..M).map(next).fold(most, f64::max)
+        };
+        let largest = (0..self.v.len()).fold(0.0, largest);
         let size = |band: &Option<Band>| {
             let size = band.as_ref().map_or(0.0, |band| band.size);
             if size > 0.0 { size } else { largest }
         };
-        let sizes = [
+        [
             size(&self.bands.input).max(size(&self.bands.change)),
             size(&self.bands.step),
             size(&self.bands.bend),
             size(&self.bands.output),
-        ];
-        let begin = self.rows.begin;
-        let size_of = |start: usize| {
-            (0..4).find(|kind| begin[*kind] == Some(start)).map_or(0.0, |kind| sizes[kind])
-        };
-        self.rows.overshoot(size_of) <= EXCESS
+        ]
     }
 }

@@ -12,6 +12,8 @@ pub(super) const OUTPUT: usize = 3;
 
 /// Distance of a slack from zero at the start, relative to the width between two limits.
 const START_WIDTH: f64 = 0.1;
+/// Rows that are worked on at a time; their number is filled up with rows without limits.
+const LANES: usize = 8;
 /// Initial slack relative to the largest violation of any row of its kind.
 const START_OVERSHOOT: f64 = 0.1;
 
@@ -19,15 +21,21 @@ const START_OVERSHOOT: f64 = 0.1;
 #[derive(Debug)]
 pub(super) struct Side {
     /// +1 for the upper side, -1 for the lower.
-    sign: f64,
+    pub(super) sign: f64,
     /// 1 with a limit, 0 without.
-    is_on: Vec<f64>,
+    pub(super) is_on: Vec<f64>,
     /// The limit; 0 without.
     pub(super) limit: Vec<f64>,
-    slack: Vec<f64>,
-    multiplier: Vec<f64>,
+    /// Multiplier of the last solution.
+    pub(super) kept: Vec<f64>,
+    /// The row is at its limit: in the last solution, or in an active-set step.
+    pub(super) is_held: Vec<bool>,
+    pub(super) slack: Vec<f64>,
+    pub(super) multiplier: Vec<f64>,
     /// `1 / slack`.
     inverse: Vec<f64>,
+    /// `1 / multiplier`; 0 without a limit.
+    inverse_multiplier: Vec<f64>,
     /// `d slack * d multiplier` of the predictor.
     second_order: Vec<f64>,
     slack_step: Vec<f64>,
@@ -41,9 +49,12 @@ impl Side {
             sign,
             is_on: vector(),
             limit: vector(),
+            kept: vector(),
+            is_held: vec![false; n_rows],
             slack: vec![1.0; n_rows],
             multiplier: vector(),
             inverse: vec![1.0; n_rows],
+            inverse_multiplier: vector(),
             second_order: vector(),
             slack_step: vector(),
             multiplier_step: vector(),
@@ -57,7 +68,7 @@ impl Side {
         self.limit[row] = if is_on { limit } else { 0.0 };
     }
 
-    fn room(&self, row: usize, value: f64) -> f64 {
+    pub(super) fn room(&self, row: usize, value: f64) -> f64 {
         self.sign * (self.limit[row] - value)
     }
 
@@ -67,7 +78,7 @@ impl Side {
 
     /// `sum slack * multiplier`.
     fn complementarity(&self) -> f64 {
-        self.slack.iter().zip(&self.multiplier).map(|(s, l)| s * l).sum()
+        sum_of(self.slack.len(), |row| self.slack[row] * self.multiplier[row])
     }
 
     /// Adds this side's share to the weight and the gradient of each row; `centre` is the target of
@@ -99,39 +110,47 @@ impl Side {
     /// relative decrease of one of them.
     fn step(&mut self, at: &[f64], steps: &[f64], centre: f64, is_corrector: bool) -> f64 {
         let order = if is_corrector { 1.0 } else { 0.0 };
-        let n = steps.len();
-        let (limit, slack) = (&self.limit[..n], &self.slack[..n]);
-        let (multiplier, inverse) = (&self.multiplier[..n], &self.inverse[..n]);
-        let (is_on, second) = (&self.is_on[..n], &mut self.second_order[..n]);
-        let (slack_step, multiplier_step) =
-            (&mut self.slack_step[..n], &mut self.multiplier_step[..n]);
-        let at = &at[..n];
-        let mut shrink = 0.0_f64;
-        for row in 0..n {
-            let residual = self.sign * (limit[row] - at[row]) - slack[row];
-            let ds = is_on[row] * (residual - self.sign * steps[row]);
-            let aim = is_on[row] * (centre - order * second[row]);
-            let dl = (aim - multiplier[row] * ds) * inverse[row] - multiplier[row];
-            slack_step[row] = ds;
-            multiplier_step[row] = dl;
-            if !is_corrector {
-                second[row] = ds * dl;
+        let sign = self.sign;
+        let (at, steps) = (lanes(at), lanes(steps));
+        let (is_on, limit) = (lanes(&self.is_on), lanes(&self.limit));
+        let (slack, multiplier) = (lanes(&self.slack), lanes(&self.multiplier));
+        let (inverse, inverse_multiplier) = (lanes(&self.inverse), lanes(&self.inverse_multiplier));
+        let second_order = self.second_order.as_chunks_mut::<LANES>().0;
+        let slack_step = self.slack_step.as_chunks_mut::<LANES>().0;
+        let multiplier_step = self.multiplier_step.as_chunks_mut::<LANES>().0;
+        // One maximum for each lane: they need not wait for each other.
+        let mut shrinks = [0.0_f64; LANES];
+        for (c, second) in second_order.iter_mut().enumerate() {
+            let (at, steps, is_on, limit) = (&at[c], &steps[c], &is_on[c], &limit[c]);
+            let (slack, multiplier, inverse) = (&slack[c], &multiplier[c], &inverse[c]);
+            let inverse_multiplier = &inverse_multiplier[c];
+            let (mut slack_steps, mut multiplier_steps) = ([0.0; LANES], [0.0; LANES]);
+            for i in 0..LANES {
+                let residual = sign * (limit[i] - at[i]) - slack[i];
+                let ds = is_on[i] * (residual - sign * steps[i]);
+                let aim = is_on[i] * (centre - order * second[i]);
+                let dl = (aim - multiplier[i] * ds) * inverse[i] - multiplier[i];
+                slack_steps[i] = ds;
+                multiplier_steps[i] = dl;
+                let (of_slack, of_multiplier) = (-ds * inverse[i], -dl * inverse_multiplier[i]);
+                let larger = if of_slack > of_multiplier { of_slack } else { of_multiplier };
+                shrinks[i] = if larger > shrinks[i] { larger } else { shrinks[i] };
             }
-            // Without a limit the second quotient is 0/0, which `max` ignores.
-            shrink = shrink.max(-ds * inverse[row]).max(-dl / multiplier[row]);
+            if !is_corrector {
+                *second = std::array::from_fn(|i| slack_steps[i] * multiplier_steps[i]);
+            }
+            slack_step[c] = slack_steps;
+            multiplier_step[c] = multiplier_steps;
         }
-        shrink
+        shrinks.into_iter().fold(0.0, f64::max)
     }
 
     /// `sum (slack + a d slack) (multiplier + a d multiplier)`.
     fn complementarity_at(&self, length: f64) -> f64 {
-        let n = self.slack.len();
-        (0..n)
-            .map(|row| {
-                (self.slack[row] + length * self.slack_step[row])
-                    * (self.multiplier[row] + length * self.multiplier_step[row])
-            })
-            .sum()
+        sum_of(self.slack.len(), |row| {
+            (self.slack[row] + length * self.slack_step[row])
+                * (self.multiplier[row] + length * self.multiplier_step[row])
+        })
     }
 
     fn advance(&mut self, length: f64) {
@@ -139,6 +158,8 @@ impl Side {
             self.slack[row] += length * self.slack_step[row];
             self.multiplier[row] += length * self.multiplier_step[row];
             self.inverse[row] = 1.0 / self.slack[row];
+            let is_on = self.is_on[row];
+            self.inverse_multiplier[row] = is_on / (self.multiplier[row] + (1.0 - is_on));
         }
     }
 
@@ -149,16 +170,33 @@ impl Side {
         for (row, value) in values.iter().enumerate() {
             if self.is_on[row] <= 0.0 {
                 (self.slack[row], self.multiplier[row], self.inverse[row]) = (1.0, 0.0, 1.0);
+                self.inverse_multiplier[row] = 0.0;
                 continue;
             }
-            let least =
-                if keep { (centre / self.multiplier[row]).min(least[row]) } else { least[row] };
+            let least = if keep { (centre / self.kept[row]).min(least[row]) } else { least[row] };
             let slack = self.room(row, *value).max(least);
             self.slack[row] = slack;
             self.inverse[row] = 1.0 / slack;
             self.multiplier[row] = centre / slack;
+            self.inverse_multiplier[row] = slack / centre;
         }
     }
+}
+
+/// Returns rows, so many at a time.
+fn lanes(values: &[f64]) -> &[[f64; LANES]] {
+    values.as_chunks().0
+}
+
+/// Sums over all rows, one sum for each lane.
+fn sum_of(n_rows: usize, term: impl Fn(usize) -> f64) -> f64 {
+    let mut sums = [0.0; LANES];
+    for first in (0..n_rows).step_by(LANES) {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum += term(first + lane);
+        }
+    }
+    sums.iter().sum()
 }
 
 /// All rows of one group of axes.
@@ -166,7 +204,8 @@ impl Side {
 pub(super) struct Rows {
     /// First row of each kind, if it has any.
     pub(super) begin: [Option<usize>; 4],
-    ranges: Vec<std::ops::Range<usize>>,
+    /// The bounded kinds and their rows.
+    pub(super) ranges: Vec<(usize, std::ops::Range<usize>)>,
     pub(super) upper: Side,
     pub(super) lower: Side,
     /// Weight of each row as a virtual output.
@@ -190,10 +229,11 @@ impl Rows {
         for (kind, count) in counts.into_iter().enumerate() {
             if count > 0 {
                 begin[kind] = Some(n_rows);
-                ranges.push(n_rows..n_rows + count);
+                ranges.push((kind, n_rows..n_rows + count));
                 n_rows += count;
             }
         }
+        let n_rows = n_rows.next_multiple_of(LANES);
         Self {
             begin,
             ranges,
@@ -222,11 +262,11 @@ impl Rows {
         fits(&self.upper) && fits(&self.lower)
     }
 
-    /// Returns the largest violation of any row, relative to the size of its limits.
-    pub(super) fn overshoot(&self, size_of_kind: impl Fn(usize) -> f64) -> f64 {
+    /// Returns the largest violation of any row, relative to the size of its kind's limits.
+    pub(super) fn overshoot(&self, sizes: &[f64; 4]) -> f64 {
         let mut worst = 0.0_f64;
-        for range in &self.ranges {
-            let size = size_of_kind(range.start).max(f64::MIN_POSITIVE);
+        for (kind, range) in &self.ranges {
+            let size = sizes[*kind].max(f64::MIN_POSITIVE);
             for row in range.clone() {
                 for side in [&self.upper, &self.lower] {
                     worst = worst.max(-side.is_on[row] * side.room(row, self.values[row]) / size);
@@ -238,7 +278,7 @@ impl Rows {
 
     /// Initialises the slacks and multipliers around the computed values.
     pub(super) fn start(&mut self, centre: f64, is_warm: bool) {
-        for range in &self.ranges {
+        for (_, range) in &self.ranges {
             let overshoot = range.clone().fold(0.0_f64, |worst, row| {
                 let room = |side: &Side| -side.is_on[row] * side.room(row, self.values[row]);
                 worst.max(room(&self.upper)).max(room(&self.lower))
@@ -281,12 +321,9 @@ impl Rows {
         self.upper.complementarity_at(length) + self.lower.complementarity_at(length)
     }
 
-    /// Takes a step of the given length.
+    /// Takes a step of the given length with slacks and multipliers.
     pub(super) fn advance(&mut self, length: f64) {
         self.upper.advance(length);
         self.lower.advance(length);
-        for (value, step) in self.values.iter_mut().zip(&self.steps) {
-            *value += length * step;
-        }
     }
 }

@@ -2,15 +2,21 @@
 //! and its pull at a point, and the two sweeps for the step from there.
 
 #![expect(clippy::needless_range_loop, reason = "matrices are written with their indices")]
+#![expect(clippy::inline_always, reason = "what takes over the instructions of its caller")]
 
 use super::interior::Interior;
 use super::riccati::Plant;
 use super::rows::{BEND, CHANGE, OUTPUT, STEP};
+use crate::learning::sweep::wide::{Wide, Work};
 
 impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
     /// Runs the recursion over all samples, with or without the weights of the rows.
-    #[inline(never)]
     pub(super) fn factorise(&mut self, with_rows: bool) {
+        self.instructions.run(Factorisation { interior: self, with_rows });
+    }
+
+    #[inline(always)]
+    fn recur(&mut self, with_rows: bool) {
         let sigma = &self.rows.sigma[..];
         let begin = if with_rows { self.rows.begin } else { [None; 4] };
         let mut cost = [[0.0; NS]; NS];
@@ -112,6 +118,12 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
 
     /// Takes a step of the given length.
     pub(super) fn advance(&mut self, length: f64) {
+        self.go(length);
+        self.rows.advance(length);
+    }
+
+    /// Takes a step of the given length, without slacks and multipliers.
+    pub(super) fn go(&mut self, length: f64) {
         for k in 0..self.v.len() {
             for i in 0..M {
                 self.v[k][i] += length * self.v_step[k][i];
@@ -120,7 +132,9 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
                 self.output[k][i] += length * self.output_step[k][i];
             }
         }
-        self.rows.advance(length);
+        for (value, step) in self.rows.values.iter_mut().zip(&self.rows.steps) {
+            *value += length * step;
+        }
     }
 
     /// Computes output and rows from the change of the input.
@@ -144,6 +158,23 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         self.v.copy_from_slice(&self.v_step);
         self.output.copy_from_slice(&self.output_step);
         self.rows.values.copy_from_slice(&self.rows.steps);
+    }
+}
+
+/// The recursion, for the instructions of the processor.
+struct Factorisation<'a, const N: usize, const M: usize, const P: usize, const NS: usize> {
+    interior: &'a mut Interior<N, M, P, NS>,
+    with_rows: bool,
+}
+
+impl<const N: usize, const M: usize, const P: usize, const NS: usize> Work
+    for Factorisation<'_, N, M, P, NS>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with(self, _: impl Wide) {
+        self.interior.recur(self.with_rows);
     }
 }
 

@@ -10,6 +10,7 @@ use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use super::super::{Bound, Bounds, Limit, Status};
 use super::lifted::{differences, lift};
 use super::{Case, cost, difference, noise};
+use crate::learning::Law;
 use crate::model::StateSpace;
 
 /// A random stable model: coupled, with or without feedthrough, delayed or not.
@@ -144,5 +145,46 @@ proptest! {
         prop_assert!((j - best).abs() < 1e-7 * best, "cost {j:e} {best:e}");
         prop_assert!(difference(&next, &expected) < 1e-7, "{:e}", difference(&next, &expected));
         prop_assert!(lifted.stationarity(&v) < 1e-6, "{:e}", lifted.stationarity(&v));
+    }
+}
+
+proptest! {
+    #![proptest_config(ilc_cases::cases(200))]
+
+    #[test]
+    fn from_the_last_solution_the_next_problem_is_solved_as_well(
+        case in random_case(),
+        sizes in proptest::collection::vec(-3.0..0.0_f64, 4),
+    ) {
+        let mut law = case.law();
+        let Case { model, n_samples, cost, bounds, u, e } = &case;
+        let mut next = u.clone();
+        law.update(u, e, &mut next).unwrap();
+        let mut error = e.clone();
+        for (seed, size) in (1..).zip(sizes) {
+            // From nearly the same problem to another one.
+            let noise = noise(e.len(), seed);
+            let scale = 10.0_f64.powf(size) * e.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+            for (error, noise) in error.iter_mut().zip(&noise) {
+                *error += scale * noise;
+            }
+            law.update(u, &error, &mut next).unwrap();
+            let mut fresh = case.law();
+            let mut expected = u.clone();
+            fresh.update(u, &error, &mut expected).unwrap();
+            prop_assert_eq!(law.status(), fresh.status());
+            if law.status() != Status::Solved {
+                // Another error moves the bounds of the output: there may be no input within them.
+                continue;
+            }
+            let lifted = lift(model, *n_samples, cost, bounds, u, &error);
+            let v = DVector::from_fn(u.len(), |i, _| next[i] - u[i]);
+            prop_assert!(lifted.excess(&v) < 1e-9, "{:e}", lifted.excess(&v));
+            prop_assert!(lifted.stationarity(&v) < 1e-6, "{:e}", lifted.stationarity(&v));
+            let other = DVector::from_fn(u.len(), |i, _| expected[i] - u[i]);
+            let (j, best) = (lifted.cost(&v), lifted.cost(&other));
+            prop_assert!((j - best).abs() < 1e-7 * best, "cost {j:e} {best:e}");
+            prop_assert!(difference(&next, &expected) < 1e-6, "{:e}", difference(&next, &expected));
+        }
     }
 }
