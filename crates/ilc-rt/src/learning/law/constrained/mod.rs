@@ -14,7 +14,6 @@ mod group;
 mod interior;
 mod load;
 mod parameters;
-
 #[cfg(test)]
 mod proof;
 mod reach;
