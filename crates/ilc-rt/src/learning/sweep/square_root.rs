@@ -27,8 +27,30 @@ pub(super) struct SquareRoot {
     /// `W'W` or `R'`, (m + n) x (m + n), column-major: only its lower triangle is used.
     lower: Vec<f64>,
     /// Factors of `S + R` (m x m) and `Q` (p x p).
-    effort: Vec<f64>,
-    error: Vec<f64>,
+    effort: Factor,
+    error: Factor,
+}
+
+/// The Cholesky factor of a weight, kept for as long as the weight is the same.
+#[derive(Debug, Clone)]
+struct Factor {
+    weight: Vec<f64>,
+    lower: Vec<f64>,
+}
+
+impl Factor {
+    fn new(side: usize) -> Self {
+        Self { weight: vec![f64::NAN; side * side], lower: vec![0.0; side * side] }
+    }
+
+    fn of(&mut self, weight: &[f64], side: usize) -> &[f64] {
+        if self.weight != weight {
+            self.weight.copy_from_slice(weight);
+            self.lower.copy_from_slice(weight);
+            cholesky::factorize(&mut self.lower, side, side);
+        }
+        &self.lower
+    }
 }
 
 impl SquareRoot {
@@ -48,8 +70,8 @@ impl SquareRoot {
             below: masks(|top, row| row >= top),
             unit: masks(|top, row| row == top),
             lower,
-            effort: room(m * m),
-            error: room(p * p),
+            effort: Factor::new(m),
+            error: Factor::new(p),
         }
     }
 
@@ -67,7 +89,7 @@ impl SquareRoot {
         let w = m + n;
         self.stack(stage, effort, later);
         let pivots = if form == Form::SquareRoot {
-            how.run(Reflect(self))
+            self.reflect_by(how)
         } else {
             let rows = HALF * self.reflector.len();
             for j in 0..w {
@@ -97,14 +119,25 @@ impl SquareRoot {
         pivots
     }
 
+    /// Reflects with loops of known length for the usual numbers of rows.
+    fn reflect_by(&mut self, how: Instructions) -> Pivots {
+        let done = match self.reflector.len() {
+            1 => how.run_if_usual(Reflect::<1>(self)),
+            2 => how.run_if_usual(Reflect::<2>(self)),
+            3 => how.run_if_usual(Reflect::<3>(self)),
+            _ => None,
+        };
+        match done {
+            Some(pivots) => pivots,
+            None => how.run(Reflect::<0>(self)),
+        }
+    }
+
     /// Writes `W`.
     fn stack(&mut self, stage: &Stage, effort: &[f64], later: &[f64]) {
         let Sizes { n, m, p, .. } = self.sizes;
         let (rows, w) = (HALF * self.reflector.len(), m + n);
-        self.effort.copy_from_slice(effort);
-        cholesky::factorize(&mut self.effort, m, m);
-        self.error.copy_from_slice(stage.q.as_slice());
-        cholesky::factorize(&mut self.error, p, p);
+        let (effort, error) = (self.effort.of(effort, m), self.error.of(stage.q.as_slice(), p));
         let (a, b) = (stage.a.as_slice(), stage.b.as_slice());
         let (c, d) = (stage.c.as_slice(), stage.d.as_slice());
         for j in 0..w {
@@ -115,10 +148,10 @@ impl SquareRoot {
             };
             let column = &mut self.stacked[j * rows..(j + 1) * rows];
             for (i, value) in column[..m].iter_mut().enumerate() {
-                *value = if j < m && i <= j { self.effort[i * m + j] } else { 0.0 };
+                *value = if j < m && i <= j { effort[i * m + j] } else { 0.0 };
             }
             for (i, value) in column[m..m + p].iter_mut().enumerate() {
-                let factor = &self.error[i * p..(i + 1) * p];
+                let factor = &error[i * p..(i + 1) * p];
                 *value = (i..p).map(|k| factor[k] * seen[k]).sum();
             }
             for (i, value) in column[m + p..][..n].iter_mut().enumerate() {
@@ -130,10 +163,12 @@ impl SquareRoot {
     /// Writes the transpose of the triangular factor of `W`, with a non-negative diagonal.
     ///
     /// A column with nothing left consumes no row, so that the row's content is kept.
+    /// `HALVES` is the length of a column in halves, 0 for one that is known at run time only.
     #[inline(always)]
-    fn reflect(&mut self, wide: impl Wide) -> Pivots {
+    fn reflect<const HALVES: usize>(&mut self, wide: impl Wide) -> Pivots {
         let Self { sizes: Sizes { n, m, p, .. }, stacked, reflector, lower, .. } = self;
-        let (halves, w) = (reflector.len(), *m + *n);
+        let halves = if HALVES > 0 { HALVES } else { reflector.len() };
+        let (reflector, w) = (&mut reflector[..halves], *m + *n);
         let mut pivots = Pivots::NONE;
         let mut top = 0;
         lower.fill(0.0);
@@ -158,12 +193,16 @@ impl SquareRoot {
             let value = column.as_flattened()[top];
             let sign = if value > 0.0 { 1.0 } else { -1.0 };
             let scale = -1.0 / (norm * (norm + value.abs()));
+            // The reflector has `reach` more in its first row, which is added where it counts: so nothing but
+            // `scale` waits for the root.
+            let reach = sign * norm;
             let units = &self.unit[top * halves..][..halves];
-            add(wide, reflector, sign * norm, units);
             lower[j * w + j] = norm;
             for (i, other) in others.chunks_exact_mut(halves).enumerate() {
-                let along = scale * dot(wide, reflector, other);
+                let shadow = dot(wide, reflector, other);
+                let along = scale * (shadow + reach * other.as_flattened()[top]);
                 add(wide, other, along, reflector);
+                add(wide, other, along * reach, units);
                 lower[j * w + j + 1 + i] = -sign * other.as_flattened()[top];
             }
             top += 1;
@@ -173,14 +212,14 @@ impl SquareRoot {
 }
 
 /// The reflections, for the widest instructions of the processor.
-struct Reflect<'a>(&'a mut SquareRoot);
+struct Reflect<'a, const HALVES: usize>(&'a mut SquareRoot);
 
-impl Work for Reflect<'_> {
+impl<const HALVES: usize> Work for Reflect<'_, HALVES> {
     type Output = Pivots;
 
     #[inline(always)]
     fn with(self, wide: impl Wide) -> Pivots {
-        self.0.reflect(wide)
+        self.0.reflect::<HALVES>(wide)
     }
 }
 

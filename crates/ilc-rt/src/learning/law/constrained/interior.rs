@@ -42,7 +42,6 @@ const START: f64 = 30.0;
 const WARM_START: f64 = 0.1;
 
 /// One group of axes: `N` states, `M` inputs, `P` outputs, `NS` states with the delayed changes.
-#[derive(Debug)]
 pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const NS: usize> {
     pub(super) plant: Plant<N, M, P>,
     pub(super) instructions: Instructions,
@@ -165,6 +164,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Keeps the present point, to return to it.
+    #[inline(never)]
     fn keep(&mut self) {
         self.rows.keep(&self.stiffness_of_rows());
         for (k, last) in self.last.iter_mut().enumerate() {
@@ -175,6 +175,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Goes to the last solution, as a change of this run's input.
+    #[inline(never)]
     fn return_to_last(&mut self) {
         for (k, v) in self.v.iter_mut().enumerate() {
             for (i, v) in v.iter_mut().enumerate() {
@@ -188,6 +189,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     ///
     /// A careful search takes more iterations, and converges where corrections alone do not: about
     /// once in ten thousand random problems.
+    #[inline(never)]
     fn search(&mut self, is_careful: bool) -> (bool, usize, f64) {
         let n_limits = self.rows.count();
         let mut residual = 1.0;
@@ -245,6 +247,14 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             }
         }
         found
+    }
+}
+
+impl<const N: usize, const M: usize, const P: usize, const NS: usize> std::fmt::Debug
+    for Interior<N, M, P, NS>
+{
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.debug_struct("Interior").field("places", &self.places).finish_non_exhaustive()
     }
 }
 

@@ -97,6 +97,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Returns the size of the limits of each kind as they were given, or that of the input.
+    #[inline(never)]
     pub(super) fn sizes(&self) -> [f64; 4] {
         let largest = |most: f64, k: usize| {
             let next = |i: usize| (self.input[k][i] + self.v[k][i]).abs();

@@ -9,10 +9,18 @@ use super::riccati::Plant;
 use super::rows::{BEND, CHANGE, OUTPUT, STEP};
 use crate::learning::sweep::wide::{Wide, Work};
 
+/// Largest state for which the recursion is compiled for each instruction set: beyond, the code is long.
+const WIDE_MAX: usize = 10;
+
 impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
     /// Runs the recursion over all samples, with or without the weights of the rows.
+    #[inline(never)]
     pub(super) fn factorise(&mut self, with_rows: bool) {
-        self.instructions.run(Factorisation { interior: self, with_rows });
+        if NS <= WIDE_MAX {
+            self.instructions.run(Factorisation { interior: self, with_rows });
+        } else {
+            self.recur(with_rows);
+        }
     }
 
     #[inline(always)]
@@ -123,6 +131,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Takes a step of the given length, without slacks and multipliers.
+    #[inline(never)]
     pub(super) fn go(&mut self, length: f64) {
         for k in 0..self.v.len() {
             for i in 0..M {
@@ -138,6 +147,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Computes output and rows from the change of the input.
+    #[inline(never)]
     pub(super) fn roll(&mut self) {
         let mut state = [0.0; NS];
         let mut before = ([0.0; M], [0.0; M]);
@@ -150,6 +160,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Goes to the solution of the problem without bounds.
+    #[inline(never)]
     pub(super) fn relax(&mut self) {
         self.v.fill([0.0; M]);
         self.output.fill([0.0; P]);
