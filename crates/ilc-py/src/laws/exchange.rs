@@ -18,7 +18,7 @@ use crate::argument::{Layout, in_order, misfit, refuse_infinite};
 use crate::detached::detached;
 
 /// Number of values up to which an update is faster than releasing the interpreter and copying.
-const SHORT: usize = 2048;
+const SHORT: usize = 8192;
 /// Values copied and checked at a time: they stay in the first-level cache.
 const PIECE: usize = 2048;
 
