@@ -172,6 +172,7 @@ impl Communication {
     }
 
     /// Returns false for frames of others, and those that no node of this kind hears.
+    #[inline]
     fn concerns(&self, frame: &Frame) -> bool {
         let id = frame.id();
         id == cob_id::NMT
@@ -195,6 +196,7 @@ impl Communication {
     }
 
     /// Handles a frame from the bus.
+    #[inline]
     pub fn receive(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) -> Incoming {
         if !self.concerns(frame) {
             return Incoming::Nothing;
@@ -251,6 +253,7 @@ impl Communication {
     }
 
     /// Lets time pass; returns true if something may be due, for [`attend`](Self::attend).
+    #[inline]
     pub fn pass(&mut self, elapsed_us: u64) -> bool {
         if self.nmt == NmtState::BootUp {
             return false;

@@ -208,16 +208,19 @@ impl Dictionary {
     }
 
     /// Returns the object at `slot`.
+    #[inline]
     pub fn entry(&self, slot: Slot) -> &Entry {
         &self.entries[slot.0]
     }
 
     /// Returns the value at `slot`, as a number.
+    #[inline]
     pub fn number(&self, slot: Slot) -> i64 {
         self.entries[slot.0].value.number()
     }
 
     /// Sets a value from inside the node, saturated to its type.
+    #[inline]
     pub fn set(&mut self, slot: Slot, number: i64) {
         self.version += 1;
         let entry = &mut self.entries[slot.0];

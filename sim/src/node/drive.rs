@@ -175,6 +175,7 @@ impl DriveNode {
     }
 
     /// Sets the measurements from now on.
+    #[inline]
     pub fn measure(&mut self, measured: Measured) {
         self.measured = measured;
     }
@@ -229,6 +230,7 @@ impl DriveNode {
     }
 
     /// Advances by one step of the drive's own loop and returns the demand for its axis.
+    #[inline]
     pub fn step(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) -> Demand {
         if self.communication.pass(step_us.into()) {
             // A PDO that is sent on a change may carry it.

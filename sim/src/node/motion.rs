@@ -195,6 +195,7 @@ impl Motion {
 
     /// Returns the interpolated position before limits; `None` if the drive does not control
     /// position.
+    #[inline]
     pub fn demand_m(&self) -> Option<f64> {
         match self.phase {
             Phase::Position { start_m, end_m, elapsed_s, period_s } => {
@@ -237,6 +238,7 @@ impl Motion {
 
     /// Advances by one step of the drive's own loop and returns the demand for it. A ramp that has
     /// come to standstill becomes a hold at that position.
+    #[inline]
     pub fn step(
         &mut self,
         limits: &MotionLimits,
@@ -310,6 +312,7 @@ impl Motion {
     }
 
     /// Returns the velocity nearest to `wanted_m_s` within the acceleration limits.
+    #[inline]
     fn reachable_m_s(&self, wanted_m_s: f64, limits: &MotionLimits, dt_s: f64) -> f64 {
         let speeds_up = wanted_m_s.abs() > self.rate_m_s.abs();
         let max_m_s2 =
@@ -323,6 +326,7 @@ impl Motion {
         }
     }
 
+    #[inline]
     fn position_demand(
         &mut self,
         limits: &MotionLimits,

@@ -79,6 +79,7 @@ impl DriveNode {
     }
 
     /// Makes the drive's own motion for the next step.
+    #[inline]
     pub(super) fn pursue(&mut self, mode: Option<DriveMode>, step_us: u32) {
         let now_m = self.measured.position_m;
         let before_m = std::mem::replace(&mut self.seen_m, now_m);

@@ -104,6 +104,7 @@ impl DriveNode {
     }
 
     /// Executes the transition after a ramp.
+    #[inline]
     pub(super) fn end_ramp(&mut self) {
         if self.motion.is_ramping() {
             return;

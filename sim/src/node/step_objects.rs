@@ -25,6 +25,7 @@ pub(super) struct StepObjects {
 
 impl DriveNode {
     /// Returns the objects of this step.
+    #[inline]
     pub(super) fn step_objects(&mut self) -> StepObjects {
         let version = self.communication.dictionary().version();
         match self.step_objects {

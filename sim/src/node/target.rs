@@ -100,6 +100,7 @@ impl DriveNode {
     }
 
     /// Monitors the following error; `None` for no window.
+    #[inline]
     pub(super) fn watch_following_error(
         &mut self,
         window: Option<i64>,
@@ -123,6 +124,7 @@ impl DriveNode {
     }
 
     /// Returns the demand before limits minus the actual position; 0 if position is not controlled.
+    #[inline]
     pub(super) fn following_error_counts(&self) -> f64 {
         let demand_m = self.motion.demand_m().unwrap_or(self.measured.position_m);
         self.units.distance(demand_m - self.measured.position_m)

@@ -43,6 +43,7 @@ impl DriveLoop {
     ///
     /// At the force limit the integral accepts only errors that lead out of saturation
     /// (anti-windup).
+    #[inline]
     pub(super) fn force_n(
         &self,
         demand: Demand,

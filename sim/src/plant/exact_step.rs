@@ -65,6 +65,7 @@ impl ExactStep {
     }
 
     /// Returns the state after a step under a constant net force on the carriage.
+    #[inline]
     pub(super) fn free(&self, z: &State, force_n: f64) -> State {
         let mut next = [0.0; 4];
         for (row, next) in next.iter_mut().enumerate() {
@@ -76,17 +77,20 @@ impl ExactStep {
     }
 
     /// The state after a step with the carriage locked where it is.
+    #[inline]
     pub(super) fn locked(&self, z: &State) -> State {
         let [[a, b], [c, d]] = self.locked;
         [z[0], 0.0, a * z[2] + b * z[3], c * z[2] + d * z[3]]
     }
 
     /// Returns the net force that brings the carriage to rest at the end of the step.
+    #[inline]
     pub(super) fn stopping_force_n(&self, z: &State) -> f64 {
         -self.free(z, 0.0)[1] / self.force[1]
     }
 
     /// Returns the force of the mode on the carriage.
+    #[inline]
     pub(super) fn mode_force_n(&self, z: &State) -> f64 {
         self.stiffness_n_m * z[2] + self.damping_n_s_m * z[3]
     }

@@ -19,6 +19,7 @@ pub struct Friction {
 
 impl Friction {
     /// Returns the magnitude of friction at a velocity other than 0.
+    #[inline]
     pub fn sliding_n(&self, velocity_m_s: f64) -> f64 {
         let ratio = velocity_m_s / self.stribeck_m_s;
         // Beyond six Stribeck velocities the exponential is below the last bit of the sum.
@@ -31,6 +32,7 @@ impl Friction {
 
     /// Returns the state after a step under a motor force, with a brake force added to the
     /// friction.
+    #[inline]
     pub(super) fn step(&self, step: &ExactStep, z: &State, motor_n: f64, brake_n: f64) -> State {
         let static_n = self.static_n + brake_n;
         let (sign, sliding_n) = if z[1] == 0.0 {

@@ -83,17 +83,14 @@ impl Library {
 /// Deletes runs, and what was kept for them alone.
 fn delete(connection: &Connection, ids: &[i64]) -> rusqlite::Result<()> {
     let (mut places, mut references) = (BTreeSet::new(), BTreeSet::new());
-    let mut place_of = connection.prepare_cached("SELECT place FROM iteration WHERE id = ?1")?;
-    let mut reference_of =
-        connection.prepare_cached("SELECT reference FROM signals WHERE id = ?1")?;
-    let mut forget_run = connection.prepare_cached("DELETE FROM iteration WHERE id = ?1")?;
-    let mut forget_signals = connection.prepare_cached("DELETE FROM signals WHERE id = ?1")?;
+    let mut forget_run =
+        connection.prepare_cached("DELETE FROM iteration WHERE id = ?1 RETURNING place")?;
+    let mut forget_signals =
+        connection.prepare_cached("DELETE FROM signals WHERE id = ?1 RETURNING reference")?;
     for id in ids {
-        let place: Option<Option<i64>> = place_of.query_row([id], |row| row.get(0)).optional()?;
+        let place: Option<Option<i64>> = forget_run.query_row([id], |row| row.get(0)).optional()?;
         places.extend(place.flatten());
-        references.extend(reference_of.query_row([id], |row| row.get::<_, i64>(0)).optional()?);
-        forget_run.execute([id])?;
-        forget_signals.execute([id])?;
+        references.extend(forget_signals.query_row([id], |row| row.get::<_, i64>(0)).optional()?);
     }
     once::forget_places(connection, &places)?;
     references.into_iter().try_for_each(|reference| once::forget_reference(connection, reference))
