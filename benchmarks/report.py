@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import tempfile
@@ -97,6 +98,7 @@ def main() -> None:
         "",
         *many_plants(),
         *past_runs(),
+        *lock_step(),
         "## In Rust",
         "",
         "Medians of `cargo bench`.",
@@ -177,6 +179,30 @@ def past_runs() -> list[str]:
         "and all inputs and errors in one file of its own.",
         "",
         *text.splitlines(),
+        "",
+    ]
+
+
+def lock_step() -> list[str]:
+    """Return the section on campaigns in lock-step."""
+    print("lock-step ...", flush=True)
+    return lock_step_section(command("cargo", "bench", "--workspace", "--bench", "main_job"))
+
+
+def lock_step_section(text: str) -> list[str]:
+    """Return the section from what the bench of the main job prints."""
+    campaigns = re.findall(r"(\d+) axes, (\d+) runs in ([^,]+), (\d+) times faster", text)
+    if not campaigns:
+        fail("the bench of the main job has no figures of campaigns in lock-step")
+    return [
+        "## Campaigns in lock-step",
+        "",
+        "The example gantry, its pair of axes repeated, with simulated drives in one process; each",
+        "run is kept on disk.",
+        "",
+        "| axes | runs | time | times faster than real time |",
+        "|--:|--:|--:|--:|",
+        *(f"| {axes} | {runs} | {took} | {times} |" for axes, runs, took, times in campaigns),
         "",
     ]
 

@@ -46,6 +46,18 @@ def test_no_figures_are_a_failure_with_a_sentence(report, tmp_path, monkeypatch)
         report.table({2: {"another": 1.0}}, "axes")
     with pytest.raises(SystemExit, match="no figures"):
         report.table({})
+    with pytest.raises(SystemExit, match="no figures of campaigns in lock-step"):
+        report.lock_step_section("update, N = 1300: 2.5us for one axis, 10.4us for two")
+
+
+def test_campaigns_in_lock_step_are_told_by_axes(report):
+    kept = "lock-step, in process, every run kept on disk: "
+    told = f"{kept}2 axes, 10 runs in 71.717ms, 464 times faster than real time\n"
+    told += f"{kept}12 axes, 20 runs in 1.586s, 91 times faster than real time\n"
+    assert report.lock_step_section(told)[-3:-1] == [
+        "| 2 | 10 | 71.717ms | 464 |",
+        "| 12 | 20 | 1.586s | 91 |",
+    ]
 
 
 def test_no_table_of_the_documents_is_empty():
