@@ -52,10 +52,10 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         let mut missed = f64::INFINITY;
         for solution in 1..=most {
             self.look();
-            self.rows.pull_to_limits();
+            self.rows.pull_to_limits(penalties);
             self.sweep(true);
             self.go(1.0);
-            missed = self.rows.correct_multipliers(sizes);
+            missed = self.rows.correct_multipliers(penalties, sizes);
             if solution >= least && missed <= MISSED {
                 break;
             }

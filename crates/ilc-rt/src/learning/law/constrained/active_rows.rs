@@ -56,24 +56,27 @@ impl Rows {
         self.lower.take_kept();
     }
 
-    /// Sets the weights of the active rows.
+    /// Sets the weights of the active rows; both sides of a row with two equal limits press.
     pub(super) fn press(&mut self, penalties: &[f64; 4]) {
         for (kind, range) in &self.ranges {
             for row in range.clone() {
-                let is_held = self.upper.is_held[row] || self.lower.is_held[row];
-                self.sigma[row] = if is_held { penalties[*kind] } else { 0.0 };
+                let sides = [self.upper.is_held[row], self.lower.is_held[row]];
+                self.sigma[row] =
+                    sides.map(|held| if held { penalties[*kind] } else { 0.0 }).iter().sum();
             }
         }
     }
 
     /// Pulls each active row to its limit.
-    pub(super) fn pull_to_limits(&mut self) {
-        for row in 0..self.pull.len() {
-            self.pull[row] = 0.0;
-            for side in [&self.upper, &self.lower] {
-                if side.is_held[row] {
-                    let way = side.limit[row] - self.values[row];
-                    self.pull[row] += self.sigma[row] * way - side.sign * side.multiplier[row];
+    pub(super) fn pull_to_limits(&mut self, penalties: &[f64; 4]) {
+        self.pull.fill(0.0);
+        for (kind, range) in &self.ranges {
+            for row in range.clone() {
+                for side in [&self.upper, &self.lower] {
+                    if side.is_held[row] {
+                        let way = side.limit[row] - self.values[row];
+                        self.pull[row] += penalties[*kind] * way - side.sign * side.multiplier[row];
+                    }
                 }
             }
         }
@@ -81,7 +84,7 @@ impl Rows {
 
     /// Adds what the penalties push to the multipliers; returns the largest violation of an equation,
     /// relative to the size of its kind's limits.
-    pub(super) fn correct_multipliers(&mut self, sizes: &[f64; 4]) -> f64 {
+    pub(super) fn correct_multipliers(&mut self, penalties: &[f64; 4], sizes: &[f64; 4]) -> f64 {
         let mut worst = 0.0_f64;
         for (kind, range) in &self.ranges {
             let size = sizes[*kind].max(f64::MIN_POSITIVE);
@@ -89,7 +92,7 @@ impl Rows {
                 for side in [&mut self.upper, &mut self.lower] {
                     if side.is_held[row] {
                         let room = side.sign * (side.limit[row] - self.values[row]);
-                        side.multiplier[row] -= self.sigma[row] * room;
+                        side.multiplier[row] -= penalties[*kind] * room;
                         worst = worst.max(room.abs() / size);
                     }
                 }

@@ -10,7 +10,7 @@ use super::rows::{BEND, CHANGE, OUTPUT, STEP};
 use crate::learning::sweep::wide::{Wide, Work};
 
 /// Largest state for which the recursion is compiled for each instruction set: beyond, the code is long.
-const WIDE_MAX: usize = 10;
+const WIDE_MAX: usize = 8;
 
 impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
     /// Runs the recursion over all samples, with or without the weights of the rows.
