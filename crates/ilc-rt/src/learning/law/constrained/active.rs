@@ -47,13 +47,17 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     /// Goes to the solution with all active rows at their limits; returns the largest violation.
     fn solve_equations(&mut self, penalties: &[f64; 4], sizes: &[f64; 4]) -> f64 {
         self.rows.press(penalties);
-        self.factorise(true);
         let [least, most] = SOLUTIONS;
         let mut missed = f64::INFINITY;
         for solution in 1..=most {
             self.look();
             self.rows.pull_to_limits(penalties);
-            self.sweep(true);
+            if solution == 1 {
+                self.factorise(true);
+                self.forward(true);
+            } else {
+                self.sweep(true);
+            }
             self.go(1.0);
             missed = self.rows.correct_multipliers(penalties, sizes);
             if solution >= least && missed <= MISSED {

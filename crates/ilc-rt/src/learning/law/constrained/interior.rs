@@ -203,7 +203,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         for iteration in 1..=most {
             self.rows.weigh(0.0, false);
             self.factorise(true);
-            self.sweep(true);
+            self.forward(true);
             let length = self.rows.step(0.0, false, 1.0);
             let shrunk = self.rows.gap_at(length) / gap;
             let centre = shrunk * shrunk * shrunk * gap / n_limits;

@@ -5,7 +5,7 @@
 #![expect(clippy::inline_always, reason = "what takes over the instructions of its caller")]
 
 use super::interior::Interior;
-use super::riccati::Plant;
+use super::riccati::{Plant, Pull};
 use super::rows::{BEND, CHANGE, OUTPUT, STEP};
 use crate::learning::sweep::wide::{Wide, Work};
 
@@ -13,7 +13,8 @@ use crate::learning::sweep::wide::{Wide, Work};
 const WIDE_MAX: usize = 8;
 
 impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
-    /// Runs the recursion over all samples, with or without the weights of the rows.
+    /// Runs the recursion over all samples, with or without the weights of the rows; for
+    /// [`forward`](Self::forward) also solves backwards, which takes no time beside it.
     #[inline(never)]
     pub(super) fn factorise(&mut self, with_rows: bool) {
         if NS <= WIDE_MAX {
@@ -27,7 +28,8 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     fn recur(&mut self, with_rows: bool) {
         let sigma = &self.rows.sigma[..];
         let begin = if with_rows { self.rows.begin } else { [None; 4] };
-        let mut cost = [[0.0; NS]; NS];
+        let row_pull = &self.rows.pull[..];
+        let (mut cost, mut slope) = ([[0.0; NS]; NS], [0.0; NS]);
         for k in (0..self.which.len()).rev() {
             let mut weighing = self.weighings[self.which[k]].clone();
             if let Some(at) = begin[CHANGE] {
@@ -51,6 +53,8 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
                 }
             }
             self.plant.earlier(&weighing, &mut cost, &mut self.gains[k]);
+            let pull = with_rows_of(&self.pulls[k], row_pull, begin, k);
+            self.kappa[k] = self.plant.backward(&self.gains[k], &pull, &mut slope);
         }
     }
 
@@ -89,28 +93,27 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Solves for the step, with or without the rows.
-    #[inline(never)]
     pub(super) fn sweep(&mut self, with_rows: bool) {
+        self.backward(with_rows);
+        self.forward(with_rows);
+    }
+
+    #[inline(never)]
+    fn backward(&mut self, with_rows: bool) {
         let gains = if with_rows { &self.gains } else { &self.plain };
         let begin = if with_rows { self.rows.begin } else { [None; 4] };
         let row_pull = &self.rows.pull[..];
         let mut slope = [0.0; NS];
         for k in (0..gains.len()).rev() {
-            let mut pull = self.pulls[k];
-            if let Some(at) = begin[CHANGE] {
-                add(&mut pull.change, &row_pull[at + k * M..][..M]);
-            }
-            if let Some(at) = begin[STEP] {
-                add(&mut pull.step, &row_pull[at + k * M..][..M]);
-            }
-            if let Some(at) = begin[BEND] {
-                add(&mut pull.bend, &row_pull[at + k * M..][..M]);
-            }
-            if let Some(at) = begin[OUTPUT] {
-                add(&mut pull.output, &row_pull[at + k * P..][..P]);
-            }
+            let pull = with_rows_of(&self.pulls[k], row_pull, begin, k);
             self.kappa[k] = self.plant.backward(&gains[k], &pull, &mut slope);
         }
+    }
+
+    /// Writes the step, after [`factorise`](Self::factorise) or from `sweep`.
+    #[inline(never)]
+    pub(super) fn forward(&mut self, with_rows: bool) {
+        let gains = if with_rows { &self.gains } else { &self.plain };
         let mut state = [0.0; NS];
         let begin = self.rows.begin;
         let mut before = ([0.0; M], [0.0; M]);
@@ -187,6 +190,30 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Work
     fn with(self, _: impl Wide) {
         self.interior.recur(self.with_rows);
     }
+}
+
+/// Returns the pull of a sample with that of its rows.
+#[inline(always)]
+fn with_rows_of<const M: usize, const P: usize>(
+    pull: &Pull<M, P>,
+    row_pull: &[f64],
+    begin: [Option<usize>; 4],
+    k: usize,
+) -> Pull<M, P> {
+    let mut pull = *pull;
+    if let Some(at) = begin[CHANGE] {
+        add(&mut pull.change, &row_pull[at + k * M..][..M]);
+    }
+    if let Some(at) = begin[STEP] {
+        add(&mut pull.step, &row_pull[at + k * M..][..M]);
+    }
+    if let Some(at) = begin[BEND] {
+        add(&mut pull.bend, &row_pull[at + k * M..][..M]);
+    }
+    if let Some(at) = begin[OUTPUT] {
+        add(&mut pull.output, &row_pull[at + k * P..][..P]);
+    }
+    pull
 }
 
 fn add(sum: &mut [f64], more: &[f64]) {
