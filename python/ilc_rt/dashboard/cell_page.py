@@ -161,6 +161,9 @@ class CellView:
             )
         option, factor = await asyncio.to_thread(charts.contour, cell, shown, self._factor)
         inputs = await asyncio.to_thread(charts.inputs, cell, shown)
+        if wanted != self._drawn:
+            # A later run was drawn meanwhile.
+            return
         draw(self._client, "contour", option)
         draw(self._client, "inputs", inputs)
         whose = "" if shown is None else f"run {shown.iteration}"

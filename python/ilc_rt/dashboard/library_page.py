@@ -57,6 +57,7 @@ class LibraryView:
         self._filter = ""
         self._axis = 0
         self._chosen: dict[Key, None] = {}
+        self._n_comparisons = 0
         self._rows: list[dict[str, Any]] = []
         self._notes: dict[int, dict[str, str]] = {}
         self._state: object = None
@@ -166,8 +167,13 @@ class LibraryView:
 
     async def _compare(self, said: Sequence[str] = ()) -> None:
         """Draw the chosen runs that can be read, and tell the others after `said`."""
+        self._n_comparisons += 1
+        number = self._n_comparisons
         keys, lost = await asyncio.to_thread(self._readable)
         runs = await asyncio.to_thread(self._archive.aligned, keys, self._axis)
+        if number != self._n_comparisons:
+            # Another run was chosen meanwhile: what is read last need not be what was chosen last.
+            return
         names = list(dict.fromkeys(name for one in runs for name in one.row["axis_names"]))
         self._axis = min(self._axis, max(0, len(names) - 1))
         self._axes.clear()
