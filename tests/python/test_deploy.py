@@ -35,7 +35,9 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def output(*argv: str | Path) -> str:
-    return subprocess.run(argv, text=True, capture_output=True, check=True, timeout=60).stdout
+    done = subprocess.run(argv, text=True, capture_output=True, check=False, timeout=60)
+    assert done.returncode == 0, (argv, done.stderr)
+    return done.stdout
 
 
 @pytest.fixture(scope="module")
