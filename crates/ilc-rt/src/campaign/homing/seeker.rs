@@ -73,8 +73,10 @@ pub(super) struct Seeker {
     cycles: u32,
     searched: u32,
     silent: u32,
-    /// The drive has shown that it is at it.
+    /// The drive has shown that it is at it, or had no home before.
     is_under_way: bool,
+    /// Bit 4 was lowered and raised once more.
+    is_asked_again: bool,
     /// The method moves the axis.
     moves: bool,
     /// Last position.
@@ -95,6 +97,7 @@ impl Seeker {
             searched: 0,
             silent: 0,
             is_under_way: false,
+            is_asked_again: false,
             moves,
             counts: None,
             anchor: None,
@@ -165,6 +168,8 @@ impl Seeker {
         match self.phase {
             Phase::Enabling => self.enable(word),
             Phase::Ready => {
+                // Home that is attained later was found by this search, though nothing between was seen.
+                self.is_under_way = !word.has(Statusword::HOMING_ATTAINED);
                 self.enter(Phase::Starting, Controlword(Controlword::ENABLE_OPERATION.0 | GO));
             }
             Phase::Starting | Phase::Searching => self.search(word),
@@ -242,9 +247,13 @@ impl Seeker {
         if self.is_under_way || has_failed {
             self.phase = Phase::Searching;
         } else if self.cycles > self.patience.starting {
-            // A drive may set its position so quickly that it never shows it.
+            // A drive may set its position so quickly that it never shows it; and a search that began at its index
+            // may end between two words, where answers come late.
             if !self.moves && is_there {
                 self.rest();
+            } else if !self.is_asked_again {
+                self.is_asked_again = true;
+                self.enter(Phase::Ready, Controlword::ENABLE_OPERATION);
             } else {
                 self.fail(Failure::NotStarted);
             }
@@ -310,12 +319,16 @@ mod tests {
 
     /// A drive that is switched on, and told to search.
     fn started(moves: bool) -> Seeker {
+        started_from(ENABLED | 0x1400, moves)
+    }
+
+    fn started_from(ready: u16, moves: bool) -> Seeker {
         let mut seeker = Seeker::new(moves, PATIENCE);
         assert_eq!(say(&mut seeker, OFF), 0x06);
         assert_eq!(say(&mut seeker, 0x0231), 0x07);
         assert_eq!(say(&mut seeker, 0x0233), 0x0F);
-        assert_eq!(say(&mut seeker, ENABLED | 0x1400), 0x0F, "bit 4 has to rise");
-        assert_eq!(say(&mut seeker, ENABLED | 0x1400), 0x1F);
+        assert_eq!(say(&mut seeker, ready), 0x0F, "bit 4 has to rise");
+        assert_eq!(say(&mut seeker, ready), 0x1F);
         seeker
     }
 
@@ -340,12 +353,24 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_never_begins_is_a_failure_unless_nothing_moves() {
+    fn a_drive_that_never_begins_is_asked_once_more_unless_nothing_moves() {
         for (moves, failure) in [(true, Some(Failure::NotStarted)), (false, None)] {
             let mut seeker = started(moves);
             while say(&mut seeker, ENABLED | 0x1400) == 0x1F {}
+            if moves {
+                assert_eq!((seeker.command().0, seeker.failure()), (0x0F, None), "bit 4 has to rise");
+                assert_eq!(say(&mut seeker, ENABLED | 0x1400), 0x1F);
+                while say(&mut seeker, ENABLED | 0x1400) == 0x1F {}
+            }
             assert_eq!(seeker.failure(), failure);
         }
+    }
+
+    #[test]
+    fn a_first_home_counts_though_its_search_ended_between_two_words() {
+        let mut seeker = started_from(ENABLED, true);
+        while say(&mut seeker, ENABLED | 0x1400) == 0x1F {}
+        assert_eq!((seeker.command().0, seeker.failure()), (0x06, None));
     }
 
     #[test]
