@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from processes_fixture import Bench
+from processes_fixture import PATIENT, Bench
 
 from ilc_rt.processes import find_program
 
@@ -87,7 +87,7 @@ def test_systemd_reads_the_service_without_a_complaint(unpacked):
 def test_the_command_of_the_service_waits_for_its_start_or_says_what_is_missing(
     unpacked: Path, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cell = bench.cell(short=True, name="etc.toml")
+    cell = bench.cell(short=True, more=PATIENT, name="etc.toml")
     etc = unpacked / "etc" / "ilc-rt" / "gantry.toml"
     etc.write_bytes(cell.read_bytes())
     (unpacked / "var" / "lib" / "ilc-rt").mkdir(parents=True)
@@ -114,7 +114,7 @@ def test_the_command_of_the_service_waits_for_its_start_or_says_what_is_missing(
     service.line_with("control: ")
     until = time.monotonic() + 60.0
     while "waiting" not in (told := output(argv[0], "ctl", etc, "status")):
-        assert time.monotonic() < until, told
+        assert time.monotonic() < until, (told, service.errors)
         time.sleep(0.1)
     service.signal(signal.SIGTERM)
     assert service.end() == 128 + signal.SIGTERM
