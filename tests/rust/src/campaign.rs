@@ -8,7 +8,7 @@ use ilc_rt::config::{Cell, Measure};
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport;
 use ilc_rt::library::Library;
-use ilc_rt::record::Figures;
+use ilc_rt::record::{Event, Figures};
 use ilc_sim::{ClockMode, Machine};
 
 use crate::Scratch;
@@ -47,6 +47,8 @@ pub struct Kept {
     pub outcome: Outcome,
     /// Digest of each run, as stored in the library and verified against its arrays.
     pub digests: Vec<String>,
+    /// Places of its states and runs among its events.
+    pub course: Vec<String>,
 }
 
 impl Kept {
@@ -75,14 +77,19 @@ pub fn run_on(cell: &Cell, bus: Box<dyn Bus>, iterations: u32, measure: Option<M
     let library = scratch.file("library.db");
     let mut options = options(library.clone(), iterations);
     options.session.measure = measure;
-    let outcome =
-        campaign::run(cell, &options, bus, None, &mut |_| {}).expect("the campaign begins");
+    let mut course = Vec::new();
+    let mut note = |event: &Event| match event {
+        Event::State { state, iteration } => course.push(format!("{state:?} {iteration}")),
+        Event::Iteration { index, .. } => course.push(format!("kept {index}")),
+        _ => {}
+    };
+    let outcome = campaign::run(cell, &options, bus, None, &mut note).expect("the campaign begins");
     let library = Library::open(&library).expect("the library opens");
     let rows = library.list(Some(&outcome.campaign)).expect("the library lists");
     // Loading checks each array against its digest.
     let digests =
         rows.iter().map(|row| library.load(row.id).expect("a whole row").digest).collect();
-    Kept { outcome, digests }
+    Kept { outcome, digests, course }
 }
 
 /// Runs a campaign on the machine in the caller's thread.

@@ -106,6 +106,21 @@ fn two_campaigns_are_the_same_bit_by_bit() {
         let (first, second) = (run(&cell, 4, None), run(&cell, 4, None));
         completed(&first, 4);
         assert_eq!(first.digests, second.digests, "{name}");
+        assert_eq!(first.course, second.course, "{name}");
+        // A run is told as kept before the next one begins.
+        let told: Vec<&str> = first.course.iter().map(String::as_str).collect();
+        let steps = [
+            "Running 0",
+            "kept 0",
+            "Running 1",
+            "kept 1",
+            "Running 2",
+            "kept 2",
+            "Running 3",
+            "kept 3",
+        ];
+        let wanted = |told: &&str| steps.contains(told);
+        assert_eq!(told.into_iter().filter(wanted).collect::<Vec<_>>(), steps, "{name}");
         assert_ne!(first.outcome.campaign, second.outcome.campaign);
         assert_ne!(first.digests[0], first.digests[1]);
     }

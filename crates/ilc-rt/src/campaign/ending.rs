@@ -31,8 +31,8 @@ impl Running<'_> {
     }
 
     /// Publishes a stored run; the first one that cannot be stored stops the axes.
-    fn on_stored(&mut self, event: StoreEvent) {
-        let Stored { record, asked, result } = match event {
+    pub(super) fn on_stored(&mut self, event: StoreEvent) {
+        let Stored { record, asked, digest, result } = match event {
             StoreEvent::Stored(stored) => *stored,
             StoreEvent::NotAmended(error) => {
                 return self.fail(FaultKind::Library, error.to_string());
@@ -40,7 +40,7 @@ impl Running<'_> {
         };
         match result {
             Some(Ok(id)) => {
-                let place = self.publish_stored(id, &record);
+                let place = self.publish_stored(id, &record, digest);
                 if asked {
                     self.unjudged.push_back((id, place));
                     self.amend_stored();
@@ -55,12 +55,12 @@ impl Running<'_> {
     }
 
     /// Publishes a stored run; returns its place.
-    fn publish_stored(&mut self, id: i64, record: &IterationRecord) -> usize {
+    fn publish_stored(&mut self, id: i64, record: &IterationRecord, digest: String) -> usize {
         self.announcer.publish(&Event::Iteration {
             campaign: self.campaign.clone(),
             id,
             index: record.index,
-            digest: record.digest(),
+            digest,
             figures: record.figures.clone(),
         });
         self.runs.add(record.index, record.figures.clone())
@@ -82,7 +82,7 @@ impl Running<'_> {
                 is_saved = false;
                 break;
             };
-            self.publish_stored(id, &record);
+            self.publish_stored(id, &record, record.digest());
         }
         let lost = if is_saved { "could not be kept at once" } else { "could not be kept" };
         let kept = match self.runs.len() {

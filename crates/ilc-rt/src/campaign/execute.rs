@@ -12,11 +12,11 @@ use super::first_input::first_input;
 use super::frozen::{self, Frozen};
 use super::input::InputError;
 use super::inputs;
-use super::keeper::Keeper;
+use super::keeper::{Keeper, Waits};
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session, StartOn};
-use super::pace::{MAILBOX, Pacer, Settings};
+use super::pace::{MAILBOX, MAILBOX_IN_LOCKSTEP, Pacer, Settings};
 use super::recording;
 use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
@@ -197,12 +197,10 @@ fn execute(
     recording::describe(recorder.as_ref(), cell, session, (&plan, &maps), facts)?;
     let meta = Arc::new(plan.meta.clone());
     let keep = options.keep.unwrap_or(cell.library.keep);
-    let keeper = if session.lockstep {
-        Keeper::in_line(library, meta, keep)
-    } else {
-        Keeper::on_thread(library, meta, keep)?
-    };
-    let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
+    let waits = if session.lockstep { Waits::WhenTold } else { Waits::Never };
+    let keeper = Keeper::new(library, meta, keep, waits)?;
+    let capacity = if session.lockstep { MAILBOX_IN_LOCKSTEP } else { MAILBOX };
+    let (mut mail, loop_side) = mailbox(capacity, Arc::clone(&session.stop));
     let own = input.map(|input| (input, 0.0, Purpose::Learning));
     if let Some((input, update_ms, purpose)) = own.or(resumed.next.take()) {
         policy.send(&mut mail, input, update_ms, purpose);

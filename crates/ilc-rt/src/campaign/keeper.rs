@@ -1,7 +1,8 @@
-//! Storage of the runs: on its own thread in real time, in line in lock-step.
+//! Storage of the runs, on its own thread.
 //!
 //! Writing to a disk can take seconds when others write too. Meanwhile the loop's mailbox must be
-//! read and the next input passed on. A run that cannot be stored ends the campaign; later ones
+//! read and the next input passed on. In lock-step the outcome is waited for where the next run starts, so that
+//! campaigns repeat event by event. A run that cannot be stored ends the campaign; later ones
 //! wait, so that the library never has a gap.
 
 use std::collections::VecDeque;
@@ -22,6 +23,8 @@ pub(super) struct Stored {
     pub(super) record: IterationRecord,
     /// True if the law was asked about it, and its decision is to be added.
     pub(super) asked: bool,
+    /// Digest of its arrays.
+    pub(super) digest: String,
     /// Its key, or the reason why it is not stored; `None` if an earlier one could not be stored.
     pub(super) result: Option<Result<i64, LibraryError>>,
 }
@@ -47,25 +50,34 @@ pub(super) enum StoreRequest {
 
 /// The library, with the thread that writes to it.
 pub(super) enum Keeper {
-    /// In the caller's thread: the result is available at once.
+    /// In the caller's thread, once all is over.
     InLine { store: Box<Store>, done: VecDeque<StoreEvent> },
     /// On its own thread.
     Thread {
         requests: Option<Sender<StoreRequest>>,
         events: Receiver<StoreEvent>,
         thread: Option<JoinHandle<Store>>,
+        /// Runs whose outcome has not been taken.
+        n_begun: usize,
+        waits: Waits,
     },
 }
 
-impl Keeper {
-    pub(super) fn in_line(library: Library, meta: Arc<Meta>, keep: Keep) -> Self {
-        Self::InLine { store: Box::new(Store::new(library, meta, keep)), done: VecDeque::new() }
-    }
+/// Time at which an outcome is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Waits {
+    /// As soon as it is there.
+    Never,
+    /// When it is [waited for](Keeper::wait).
+    WhenTold,
+}
 
-    pub(super) fn on_thread(
+impl Keeper {
+    pub(super) fn new(
         library: Library,
         meta: Arc<Meta>,
         keep: Keep,
+        waits: Waits,
     ) -> Result<Self, CampaignError> {
         let (requests, received) = channel();
         let (done, events) = channel();
@@ -83,11 +95,20 @@ impl Keeper {
                 store
             })
             .map_err(|source| CampaignError::Thread { what: "library", source })?;
-        Ok(Self::Thread { requests: Some(requests), events, thread: Some(thread) })
+        Ok(Self::Thread {
+            requests: Some(requests),
+            events,
+            thread: Some(thread),
+            n_begun: 0,
+            waits,
+        })
     }
 
     /// Begins to store a run.
     pub(super) fn append(&mut self, record: IterationRecord, asked: bool) {
+        if let Self::Thread { n_begun, .. } = self {
+            *n_begun += 1;
+        }
         self.send(StoreRequest::Append(Box::new(record), asked));
     }
 
@@ -111,18 +132,29 @@ impl Keeper {
         }
     }
 
-    /// Returns the oldest outcome.
+    /// Returns the oldest outcome that need not be waited for.
     pub(super) fn poll(&mut self) -> Option<StoreEvent> {
         match self {
             Self::InLine { done, .. } => done.pop_front(),
-            Self::Thread { events, .. } => events.try_recv().ok(),
+            Self::Thread { waits: Waits::WhenTold, .. } => None,
+            Self::Thread { events, n_begun, .. } => taken(events.try_recv().ok(), n_begun),
+        }
+    }
+
+    /// Waits for the outcome of the oldest run in lock-step, and returns it; `None` if there is none left.
+    pub(super) fn wait(&mut self) -> Option<StoreEvent> {
+        match self {
+            Self::Thread { events, n_begun, waits: Waits::WhenTold, .. } if *n_begun > 0 => {
+                taken(events.recv().ok(), n_begun)
+            }
+            _ => None,
         }
     }
 
     /// Waits until every request is done and returns the outcomes not taken by [`poll`](Self::poll); from
     /// then on requests are executed in line.
     pub(super) fn flush(&mut self) -> Vec<StoreEvent> {
-        let Self::Thread { requests, events, thread } = self else { return Vec::new() };
+        let Self::Thread { requests, events, thread, .. } = self else { return Vec::new() };
         drop(requests.take());
         let rest: Vec<StoreEvent> = events.iter().collect();
         if let Some(store) = thread.take().and_then(|thread| thread.join().ok()) {
@@ -170,8 +202,9 @@ impl Store {
     }
 
     fn keep(&mut self, record: IterationRecord, asked: bool) -> Stored {
+        let digest = record.digest();
         if self.is_stuck {
-            return Stored { record, asked, result: None };
+            return Stored { record, asked, digest, result: None };
         }
         let result = self.library.append(&self.meta, &record);
         if let Ok(id) = &result {
@@ -183,6 +216,13 @@ impl Store {
             self.is_stuck = true;
             self.library.hurry();
         }
-        Stored { record, asked, result: Some(result) }
+        Stored { record, asked, digest, result: Some(result) }
     }
+}
+
+fn taken(event: Option<StoreEvent>, n_begun: &mut usize) -> Option<StoreEvent> {
+    if matches!(event, Some(StoreEvent::Stored(_))) {
+        *n_begun -= 1;
+    }
+    event
 }

@@ -16,6 +16,8 @@ use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
 pub(super) const MAILBOX: usize = 8192;
+/// The same in lock-step, where it is read after every tick: a large one would not stay in the cache.
+pub(super) const MAILBOX_IN_LOCKSTEP: usize = 128;
 /// Period at which the mailbox of a loop on its own thread is read.
 const READ_EVERY: Duration = Duration::from_millis(2);
 

@@ -172,6 +172,9 @@ impl Running<'_> {
                     }
                 }
                 Message::RunStarted { run, table } => {
+                    while let Some(event) = self.keeper.wait() {
+                        self.on_stored(event);
+                    }
                     self.collector.begin(run);
                     self.policy.started(table);
                 }

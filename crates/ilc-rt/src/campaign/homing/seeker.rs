@@ -358,7 +358,11 @@ mod tests {
             let mut seeker = started(moves);
             while say(&mut seeker, ENABLED | 0x1400) == 0x1F {}
             if moves {
-                assert_eq!((seeker.command().0, seeker.failure()), (0x0F, None), "bit 4 has to rise");
+                assert_eq!(
+                    (seeker.command().0, seeker.failure()),
+                    (0x0F, None),
+                    "bit 4 has to rise"
+                );
                 assert_eq!(say(&mut seeker, ENABLED | 0x1400), 0x1F);
                 while say(&mut seeker, ENABLED | 0x1400) == 0x1F {}
             }
