@@ -61,7 +61,7 @@ pub(super) fn delete(connection: &Connection, gone: &[i64]) -> rusqlite::Result<
 }
 
 /// Creates the tree from the places that are left: deleting a box takes longer than inserting one.
-fn build(connection: &Connection) -> rusqlite::Result<()> {
+pub(super) fn build(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch("DROP TABLE near")?;
     schema::create(connection)?;
     let mut places = connection.prepare("SELECT id FROM place")?;

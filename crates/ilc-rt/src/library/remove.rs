@@ -1,10 +1,11 @@
 //! Deletion of runs, and the return of their space.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 use rusqlite::{Connection, OptionalExtension};
 
 use super::error::LibraryError;
+use super::near;
 use super::once;
 use super::schema;
 use super::store::Library;
@@ -13,6 +14,10 @@ use super::store::Library;
 const STEP_PAGES: i64 = 1024;
 /// Largest number of pages that are copied at once, in a fraction of a second.
 const COPIED_PAGES: i64 = 8192;
+/// Deleted runs for one that is left from which those that are left are copied.
+const DELETED_PER_LEFT: usize = 4;
+/// Number of deleted runs up to which each is deleted on its own.
+const FEW: usize = 500;
 
 impl Library {
     /// Deletes these runs, all or none; the file keeps its size, as later runs use their space.
@@ -82,6 +87,18 @@ impl Library {
 
 /// Deletes runs, and what was kept for them alone.
 fn delete(connection: &Connection, ids: &[i64]) -> rusqlite::Result<()> {
+    if ids.len() > FEW {
+        let gone: HashSet<i64> = ids.iter().copied().collect();
+        let mut all = connection.prepare("SELECT id FROM iteration")?;
+        let (without, left): (Vec<i64>, Vec<i64>) = all
+            .query_map([], |row| row.get(0))?
+            .collect::<rusqlite::Result<Vec<i64>>>()?
+            .into_iter()
+            .partition(|id| gone.contains(id));
+        if without.len() > DELETED_PER_LEFT * left.len() {
+            return leave(connection, &left);
+        }
+    }
     let (mut places, mut references) = (BTreeSet::new(), BTreeSet::new());
     let mut forget_run =
         connection.prepare_cached("DELETE FROM iteration WHERE id = ?1 RETURNING place")?;
@@ -94,4 +111,103 @@ fn delete(connection: &Connection, ids: &[i64]) -> rusqlite::Result<()> {
     }
     once::forget_places(connection, &places)?;
     references.into_iter().try_for_each(|reference| once::forget_reference(connection, reference))
+}
+
+/// Deletes all runs but a few: SQLite empties a whole table sooner than it deletes most of its rows.
+fn leave(connection: &Connection, left: &[i64]) -> rusqlite::Result<()> {
+    connection.execute_batch("CREATE TEMP TABLE left_id (id INTEGER PRIMARY KEY)")?;
+    let mut insert = connection.prepare("INSERT INTO left_id VALUES (?1)")?;
+    left.iter().try_for_each(|id| insert.execute([id]).map(drop))?;
+    connection.execute_batch(
+        "CREATE TEMP TABLE left_run AS SELECT * FROM iteration WHERE id IN left_id;
+        CREATE TEMP TABLE left_signals AS SELECT * FROM signals WHERE id IN left_id;
+        CREATE TEMP TABLE left_place AS
+            SELECT * FROM place WHERE id IN (SELECT place FROM left_run);
+        DELETE FROM iteration;
+        DELETE FROM signals;
+        DELETE FROM place;
+        INSERT INTO iteration SELECT * FROM left_run;
+        INSERT INTO signals SELECT * FROM left_signals;
+        INSERT INTO place SELECT * FROM left_place;
+        DELETE FROM reference WHERE id NOT IN (SELECT reference FROM signals);
+        DROP TABLE left_id;
+        DROP TABLE left_run;
+        DROP TABLE left_signals;
+        DROP TABLE left_place;",
+    )?;
+    near::build(connection)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{meta, record};
+    use super::*;
+    use crate::record::{IterationRecord, Meta};
+
+    /// Runs under some disturbances, in two cells, with two sets of set points.
+    fn filled(n_runs: u32) -> Library {
+        let library = Library::in_memory().unwrap();
+        for index in 0..n_runs {
+            let mut run = record(index);
+            run.disturbance = match index % 5 {
+                0 => Vec::new(),
+                part => vec![f64::from(part), f64::from(index % 97)],
+            };
+            if index % 3 == 0 {
+                run.reference_m[0] += 1.0;
+            }
+            let mut meta = meta("a");
+            if index % 7 == 0 {
+                meta = Meta { cell: "mill".into(), campaign: "b".into(), ..meta };
+            }
+            library.append(&meta, &IterationRecord { index, ..run }).unwrap();
+        }
+        library.connection.execute("UPDATE iteration SET created_utc = 'then'", []).unwrap();
+        library
+    }
+
+    /// Every value of every table.
+    fn content(library: &Library) -> Vec<String> {
+        let tables = ["iteration", "signals", "place", "reference", "cell", "near_rowid"];
+        let mut all = Vec::new();
+        for table in tables {
+            let what = if table == "near_rowid" { "rowid" } else { "*" };
+            let query = format!("SELECT {what} FROM {table} ORDER BY 1");
+            let mut statement = library.connection.prepare(&query).unwrap();
+            let n = statement.column_count();
+            let mut rows = statement.query([]).unwrap();
+            while let Some(row) = rows.next().unwrap() {
+                let values = (0..n).map(|at| format!("{:?}", row.get_ref(at).unwrap()));
+                all.push(format!("{table}: {}", values.collect::<Vec<_>>().join(", ")));
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn most_runs_at_once_are_deleted_like_each_on_its_own() {
+        for (n_left, every) in [(0, 701), (1, 700), (70, 10)] {
+            let (at_once, one_by_one) = (filled(700), filled(700));
+            let gone: Vec<i64> = (1..=700).filter(|id| id % every != 0).collect();
+            at_once.remove(&gone).unwrap();
+            for id in gone {
+                one_by_one.remove(&[id]).unwrap();
+            }
+            assert!(content(&at_once) == content(&one_by_one), "{n_left} left");
+            assert_eq!(at_once.list(None).unwrap().len(), n_left);
+        }
+    }
+
+    #[test]
+    fn a_deletion_of_most_runs_that_fails_changes_nothing() {
+        let library = filled(700);
+        let before = content(&library);
+        library.connection.execute_batch("CREATE TEMP TABLE left_signals (id)").unwrap();
+        let gone: Vec<i64> = (1..=699).collect();
+        assert!(library.remove(&gone).is_err());
+        assert!(content(&library) == before);
+        library.connection.execute_batch("DROP TABLE left_signals").unwrap();
+        library.remove(&gone).unwrap();
+        assert_eq!(library.list(None).unwrap().len(), 1);
+    }
 }
