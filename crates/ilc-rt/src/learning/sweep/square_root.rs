@@ -76,6 +76,7 @@ impl SquareRoot {
     }
 
     /// Writes the `U` of the previous sample, the Cholesky factor of `H` and `K`.
+    #[inline(never)]
     pub(super) fn step(
         &mut self,
         form: Form,
@@ -85,13 +86,36 @@ impl SquareRoot {
         (later, earlier): (&[f64], &mut [f64]),
         (lower, feedback): (&mut [f64], &mut [f64]),
     ) -> Pivots {
-        let Sizes { n, m, .. } = self.sizes;
+        let Sizes { n, m, p, .. } = self.sizes;
+        let (given, cost, gains) = ((stage, effort), (later, earlier), (lower, feedback));
+        macro_rules! choose {
+            ($(($n:literal, $m:literal, $p:literal))*) => {
+                match (n, m, p) {
+                    // With numbers known here, the compiler lays out the same loops.
+                    $(($n, $m, $p) => self.step_of([$n, $m, $p], form, how, given, cost, gains),)*
+                    _ => self.step_of([n, m, p], form, how, given, cost, gains),
+                }
+            };
+        }
+        choose!((1, 1, 1)(2, 1, 1)(3, 1, 1)(4, 1, 1)(2, 1, 2)(3, 1, 2)(4, 1, 2)(4, 2, 2)(6, 2, 4))
+    }
+
+    #[inline(always)]
+    fn step_of(
+        &mut self,
+        [n, m, p]: [usize; 3],
+        form: Form,
+        how: Instructions,
+        (stage, effort): (&Stage, &[f64]),
+        (later, earlier): (&[f64], &mut [f64]),
+        (lower, feedback): (&mut [f64], &mut [f64]),
+    ) -> Pivots {
         let w = m + n;
-        self.stack(stage, effort, later);
+        self.stack([n, m, p], stage, effort, later);
         let pivots = if form == Form::SquareRoot {
             self.reflect_by(how)
         } else {
-            let rows = HALF * self.reflector.len();
+            let rows = (m + p + n).next_multiple_of(HALF);
             for j in 0..w {
                 for i in j..w {
                     let (left, right) = (&self.stacked[i * rows..], &self.stacked[j * rows..]);
@@ -134,9 +158,9 @@ impl SquareRoot {
     }
 
     /// Writes `W`.
-    fn stack(&mut self, stage: &Stage, effort: &[f64], later: &[f64]) {
-        let Sizes { n, m, p, .. } = self.sizes;
-        let (rows, w) = (HALF * self.reflector.len(), m + n);
+    #[inline(always)]
+    fn stack(&mut self, [n, m, p]: [usize; 3], stage: &Stage, effort: &[f64], later: &[f64]) {
+        let (rows, w) = ((m + p + n).next_multiple_of(HALF), m + n);
         let (effort, error) = (self.effort.of(effort, m), self.error.of(stage.q.as_slice(), p));
         let (a, b) = (stage.a.as_slice(), stage.b.as_slice());
         let (c, d) = (stage.c.as_slice(), stage.d.as_slice());
