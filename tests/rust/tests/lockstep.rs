@@ -107,7 +107,7 @@ fn two_campaigns_are_the_same_bit_by_bit() {
         completed(&first, 4);
         assert_eq!(first.digests, second.digests, "{name}");
         assert_eq!(first.course, second.course, "{name}");
-        // A run is told as kept before the next one begins.
+        // A run is reported as kept before the next one begins.
         let told: Vec<&str> = first.course.iter().map(String::as_str).collect();
         let steps = [
             "Running 0",
