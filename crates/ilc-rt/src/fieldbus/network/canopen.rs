@@ -23,6 +23,9 @@ const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
 /// Object of a simulated drive with its digital inputs: who writes it presses a button, and commands no axis.
 pub const SIMULATED_INPUTS: u16 = 0x2001;
 
+/// Numbers of nodes: an identifier is that of a service, a multiple of it, plus the node's.
+const N_NODES: usize = 128;
+
 /// Time for the answer of a drive in fault; the axes are at rest by then.
 const ERROR_CODE_WAIT: Duration = Duration::from_millis(100);
 
@@ -41,6 +44,8 @@ pub struct Station {
 pub struct CanopenAxes {
     bus: Box<dyn Bus>,
     stations: Vec<Station>,
+    /// Axis of each node's number.
+    axes: [Option<u8>; N_NODES],
     tool: Option<NodeId>,
     /// True if the nodes are simulated.
     simulated: bool,
@@ -66,7 +71,11 @@ impl fmt::Debug for CanopenAxes {
 impl CanopenAxes {
     /// Creates the network of some drives, in the order of the axes. Cold.
     pub fn new(bus: Box<dyn Bus>, stations: Vec<Station>, tool: Option<NodeId>) -> Self {
-        Self { bus, stations, tool, simulated: false, beat: None }
+        let mut axes = [None; N_NODES];
+        for (axis, station) in (0..).zip(&stations) {
+            axes[usize::from(station.node.get())] = Some(axis);
+        }
+        Self { bus, stations, axes, tool, simulated: false, beat: None }
     }
 
     /// Sets whether the nodes are simulated: their inputs may then be switched by other programs.
@@ -132,7 +141,9 @@ impl CanopenAxes {
     /// Returns the answer to SYNC in a frame, if it is one.
     fn answer(&self, frame: &Frame) -> Option<Arrival> {
         let n_bytes = u8::try_from(frame.payload().len()).unwrap_or(u8::MAX);
-        for (axis, station) in self.stations.iter().enumerate() {
+        let axis = self.axes[usize::from(frame.id()) % N_NODES].map(usize::from);
+        if let Some((axis, station)) = axis.and_then(|axis| Some((axis, self.stations.get(axis)?)))
+        {
             let parts = [(AnswerPart::Status, STATUS_PDO), (AnswerPart::Motion, DRIVE_MOTION_PDO)];
             for ((part, pdo), layout) in parts.into_iter().zip(&station.map.answers) {
                 if layout.is_empty() || frame.id() != pdo.default_cob_id(station.node) {
