@@ -141,11 +141,15 @@ def test_rules_keep_the_newest_and_the_best(library: Library) -> None:
         library.retain(days=-1)
 
 
+@pytest.mark.parametrize(
+    ("together", "firsts"), [(0, [0, 4, 8]), (9, [0, 4, 8]), (10, [0]), (200_000, [0])]
+)
 def test_runs_are_deleted_in_batches_that_are_told(
-    library: Library, monkeypatch: pytest.MonkeyPatch
+    library: Library, monkeypatch: pytest.MonkeyPatch, together: int, firsts: list[int]
 ) -> None:
     """No writer waits for all of them; oldest first, so that the rest is a library, too."""
     monkeypatch.setattr("ilc_rt.library.DELETED_AT_ONCE", 4)
+    monkeypatch.setattr("ilc_rt.library.DELETED_TOGETHER", together)
     told: list[tuple[int, int]] = []
     left: list[list[int]] = []
 
@@ -154,8 +158,8 @@ def test_runs_are_deleted_in_batches_that_are_told(
         left.append([run["id"] for run in library])
 
     assert library.retain(newest=2, progress=tell) == 10
-    assert told == [(0, 10), (4, 10), (8, 10)]
-    assert left == [list(range(1, 13)), list(range(5, 13)), list(range(9, 13))]
+    assert told == [(first, 10) for first in firsts]
+    assert left == [list(range(1 + first, 13)) for first in firsts]
     assert [run["id"] for run in library] == [11, 12]
 
 

@@ -238,6 +238,14 @@ def test_ctrl_c_in_plot_keeps_the_former_pictures(
     assert [path.read_bytes() for path in files] == before
 
 
+#: Runs go ten by ten, also where few are left.
+IN_BATCHES = """
+import ilc_rt.library
+ilc_rt.library.DELETED_AT_ONCE = 10
+ilc_rt.library.DELETED_TOGETHER = 0
+"""
+
+
 @pytest.mark.parametrize(("at", "left"), [(1, 60), (3, 40)])
 def test_ctrl_c_in_trim_deletes_whole_batches_and_the_next_one_goes_on(
     at: int, left: int, tmp_path: Path
@@ -245,8 +253,9 @@ def test_ctrl_c_in_trim_deletes_whole_batches_and_the_next_one_goes_on(
     path = filled(tmp_path / "l.db", 60)
     before, size = content(path), path.stat().st_size
     words = ["library", "trim", path, "--newest", "10"]
-    batches = "import ilc_rt.library\nilc_rt.library.DELETED_AT_ONCE = 10\n"
-    process = ilc(tmp_path, *words, before=batches + slow("ilc_rt.library", "Library._remove", at))
+    process = ilc(
+        tmp_path, *words, before=IN_BATCHES + slow("ilc_rt.library", "Library._remove", at)
+    )
     process.line_with("waiting")
     assert interrupt(process) == [f"ilc: stopped; {60 - left} runs are deleted, {left} are there"]
     assert content(path) == before[-left:]
@@ -261,8 +270,9 @@ def test_ctrl_c_in_trim_deletes_whole_batches_and_the_next_one_goes_on(
 def test_ctrl_c_in_trim_by_relevance_leaves_the_rest(tmp_path: Path) -> None:
     path = filled(tmp_path / "l.db", 60)
     size, words = path.stat().st_size, ["library", "trim", path, "10"]
-    batches = "import ilc_rt.library\nilc_rt.library.DELETED_AT_ONCE = 10\n"
-    process = ilc(tmp_path, *words, before=batches + slow("ilc_rt.library", "Library._remove", 3))
+    process = ilc(
+        tmp_path, *words, before=IN_BATCHES + slow("ilc_rt.library", "Library._remove", 3)
+    )
     process.line_with("waiting")
     assert interrupt(process) == ["ilc: stopped; 20 runs are deleted, 40 are there"]
     again = ilc(tmp_path, *words)
