@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::command::{Reply, execute};
 use super::error::ControlError;
@@ -22,10 +22,10 @@ use super::shared::Shared;
 const CLIENTS_MAX: usize = 8;
 /// Bytes of a command.
 const LINE_BYTES_MAX: usize = 256;
-/// Time from the connection to the whole command.
-const PATIENCE: Duration = Duration::from_secs(2);
 /// Pause between two looks at the socket.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
+/// Looks from the connection to the whole command: two seconds, of which none pass while the computer stalls.
+const LOOKS: u32 = 200;
 
 /// The socket of a cell, with its thread.
 #[derive(Debug)]
@@ -85,7 +85,7 @@ impl Drop for Server {
 struct Client {
     stream: UnixStream,
     line: Vec<u8>,
-    until: Instant,
+    looks_left: u32,
 }
 
 fn serve(listener: &UnixListener, shared: &Shared, ends: &AtomicBool) {
@@ -95,8 +95,7 @@ fn serve(listener: &UnixListener, shared: &Shared, ends: &AtomicBool) {
         for _ in 0..CLIENTS_MAX {
             let Ok((stream, _)) = listener.accept() else { break };
             if clients.len() < CLIENTS_MAX && stream.set_nonblocking(true).is_ok() {
-                let until = Instant::now() + PATIENCE;
-                clients.push(Client { stream, line: Vec::new(), until });
+                clients.push(Client { stream, line: Vec::new(), looks_left: LOOKS });
             }
         }
         clients.retain_mut(|client| !is_done(client, shared));
@@ -117,7 +116,10 @@ fn is_done(client: &mut Client, shared: &Shared) -> bool {
             }
             end.is_some() || client.line.len() > LINE_BYTES_MAX
         }
-        Err(error) if error.kind() == ErrorKind::WouldBlock => Instant::now() > client.until,
+        Err(error) if error.kind() == ErrorKind::WouldBlock => {
+            client.looks_left = client.looks_left.saturating_sub(1);
+            client.looks_left == 0
+        }
         Err(_) => true,
     }
 }
