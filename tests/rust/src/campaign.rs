@@ -47,7 +47,7 @@ pub struct Kept {
     pub outcome: Outcome,
     /// Digest of each run, as stored in the library and verified against its arrays.
     pub digests: Vec<String>,
-    /// Places of its states and runs among its events.
+    /// Its states and stored runs, in the order of its events.
     pub course: Vec<String>,
 }
 

@@ -141,7 +141,7 @@ impl Keeper {
         }
     }
 
-    /// Waits for the outcome of the oldest run in lock-step, and returns it; `None` if there is none left.
+    /// In lock-step, blocks until the oldest pending run is stored and returns its outcome; `None` if no run is pending.
     pub(super) fn wait(&mut self) -> Option<StoreEvent> {
         match self {
             Self::Thread { events, n_begun, waits: Waits::WhenTold, .. } if *n_begun > 0 => {

@@ -14,7 +14,7 @@ use super::store::Library;
 const STEP_PAGES: i64 = 1024;
 /// Largest number of pages that are copied at once, in a fraction of a second.
 const COPIED_PAGES: i64 = 8192;
-/// Deleted runs for one that is left from which those that are left are copied.
+/// Ratio of deleted to remaining runs above which the remaining ones are copied.
 const DELETED_PER_LEFT: usize = 4;
 /// Number of deleted runs up to which each is deleted on its own.
 const FEW: usize = 500;

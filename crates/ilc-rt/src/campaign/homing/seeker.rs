@@ -168,7 +168,7 @@ impl Seeker {
         match self.phase {
             Phase::Enabling => self.enable(word),
             Phase::Ready => {
-                // Home that is attained later was found by this search, though nothing between was seen.
+                // If the drive has no home yet, this search finds it, even if no answer shows it under way.
                 self.is_under_way = !word.has(Statusword::HOMING_ATTAINED);
                 self.enter(Phase::Starting, Controlword(Controlword::ENABLE_OPERATION.0 | GO));
             }

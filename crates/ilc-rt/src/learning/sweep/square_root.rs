@@ -91,7 +91,7 @@ impl SquareRoot {
         macro_rules! choose {
             ($(($n:literal, $m:literal, $p:literal))*) => {
                 match (n, m, p) {
-                    // With numbers known here, the compiler lays out the same loops.
+                    // The compiler unrolls the same loops where it knows the sizes.
                     $(($n, $m, $p) => self.step_of([$n, $m, $p], form, how, given, cost, gains),)*
                     _ => self.step_of([n, m, p], form, how, given, cost, gains),
                 }
