@@ -189,8 +189,12 @@ class Bench:
         trace: TracebackType | None,
     ) -> None:
         """End all programs."""
-        for process in self._processes:
-            process.close()
+        self.close()
+
+    def close(self) -> None:
+        """End all programs; others can be started afterwards."""
+        while self._processes:
+            self._processes.pop().close()
 
     def cell(
         self,

@@ -16,6 +16,7 @@ from ilc_rt.dashboard.frame import (
     call,
     chart,
     draw,
+    every,
     fact,
     level,
     page_frame,
@@ -59,8 +60,8 @@ def build_cell(fleet: Fleet, archive: Archive, name: str) -> None:
             ui.timer(1.0, lambda: _reload_if(name in fleet.cells))
             return
         view = CellView(fleet, archive, fleet.cells[name], ui.context.client)
-    ui.timer(LIVE_S, view.push)
-    ui.timer(REFRESH_S, view.refresh)
+    every(LIVE_S, view.push)
+    every(REFRESH_S, view.refresh)
 
 
 class CellView:
@@ -77,18 +78,18 @@ class CellView:
         with tag("div", "grid"):
             self._build()
 
-    def push(self) -> None:
-        """Send the newest points of the signals."""
+    def push(self) -> bool:
+        """Send the newest points of the signals, and return if there were any."""
         cell = self._cell
         with self._fleet.lock:
             window, epoch = cell.window, cell.epoch
             if window is None:
-                return
+                return False
             if epoch != self._epoch:
                 self._epoch, self._mark = epoch, 0
             first, low, high = window.since(self._mark)
             if not len(low):
-                return
+                return False
             self._mark = first + len(low)
             parts = self._parts(*window.since(0)[1:])
             seconds = window.span * (cell.cycle_s or 0.0)
@@ -100,6 +101,7 @@ class CellView:
                 "low": _rows(low), "high": _rows(high), "charts": parts,
             },
         )  # fmt: skip
+        return True
 
     async def refresh(self) -> None:
         """Show texts and tables again, and the charts if their data has changed."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -11,12 +12,14 @@ from nicegui import ui
 from ilc_rt.dashboard.look import STUB
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Awaitable, Callable, Iterator
 
     from nicegui import Client
     from nicegui.element import Element
 
 PAGES = {"/": "Cells", "/library": "Library"}
+#: Seconds after which a browser that does not answer, as one in the background, is sent more.
+SHOWN_S = 5.0
 
 
 @contextmanager
@@ -105,6 +108,26 @@ def call(client: Client, method: str, *values: object) -> None:
     """Call a function of the page's script, without waiting for it."""
     arguments = ", ".join(json.dumps(value, separators=(",", ":")) for value in values)
     client.run_javascript(f"window.ilc.{method}({arguments})")
+
+
+def every(interval_s: float, work: Callable[[], bool | Awaitable[None] | None]) -> None:
+    """Do some work for this page again and again, at the pace of its browser.
+
+    The next turn waits until the browser has shown what was sent: a slow one gets fewer points and
+    texts instead of a growing queue. Work that returns false has sent nothing.
+    """
+    client = ui.context.client
+
+    async def turn() -> None:
+        done = work()
+        if inspect.isawaitable(done):
+            await done
+        elif done is False:
+            return
+        with suppress(TimeoutError):
+            await client.run_javascript("window.ilc.shown()", timeout=SHOWN_S)
+
+    ui.timer(interval_s, turn)
 
 
 def level(element: Element, name: str) -> None:

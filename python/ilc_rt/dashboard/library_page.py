@@ -9,7 +9,7 @@ from nicegui import ui
 
 from ilc_rt.dashboard import charts
 from ilc_rt.dashboard.archive import distance, relevance
-from ilc_rt.dashboard.frame import chart, draw, page_frame, panel, say, tag, text
+from ilc_rt.dashboard.frame import chart, draw, every, page_frame, panel, say, tag, text
 from ilc_rt.dashboard.library_table import RunLine, key_of, runs_table
 from ilc_rt.dashboard.notes import name_of, read_notes, write_note
 from ilc_rt.errors import BadInputError
@@ -45,7 +45,7 @@ def build_library(fleet: Fleet, archive: Archive, *, with_notes: bool) -> None:
             return
         view = LibraryView(fleet, archive, ui.context.client, with_notes=with_notes)
     ui.timer(0.0, view.refresh, once=True)
-    ui.timer(REFRESH_S, view.refresh)
+    every(REFRESH_S, view.refresh)
 
 
 class LibraryView:

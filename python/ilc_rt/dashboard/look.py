@@ -21,6 +21,7 @@ document.documentElement.lang = "en";
 window.ilc = {queue: []};
 for (const name of ["draw", "live", "theme"])
   window.ilc[name] = (...values) => window.ilc.queue.push([name, ...values]);
+window.ilc.shown = () => new Promise((done) => addEventListener("load", () => done()));
 </script>
 <script type="module" src="/dashboard/dashboard.js"></script>
 <link rel="stylesheet" href="/dashboard/colours.css">

@@ -6,9 +6,7 @@ import time
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from nicegui import ui
-
-from ilc_rt.dashboard.frame import fact, level, page_frame, say, tag, text
+from ilc_rt.dashboard.frame import every, fact, level, page_frame, say, tag, text
 from ilc_rt.dashboard.status import run_words
 from ilc_rt.quantity import signed
 from ilc_rt.text import printable
@@ -39,7 +37,7 @@ def build_overview(fleet: Fleet) -> None:
             nothing.set_visibility(not fleet.cells)
 
     refresh()
-    ui.timer(REFRESH_S, refresh)
+    every(REFRESH_S, refresh)
 
 
 class _Card:

@@ -167,6 +167,11 @@ function paintDirty() {
   dirty.clear();
 }
 
+function shown() {
+  // For the server, which sends more after it: what is in sight has been painted.
+  if (waiting && !document.hidden) return new Promise((done) => requestAnimationFrame(() => done()));
+}
+
 function paintLive(entry) {
   if (!ring) return;
   const { from, scales, units } = entry.live;
@@ -221,6 +226,7 @@ function ready() {
 Object.assign(window.ilc, {
   draw,
   live,
+  shown,
   theme,
   // For tests: what is drawn.
   option: (name) => charts.get(name)?.chart.getOption(),
