@@ -455,7 +455,16 @@ def contour_error(a: dict[str, Any]) -> NDArray[np.float64]: ...
 
 @disjoint_base
 class MovePlan:
-    def __new__(cls, a: dict[str, Any]) -> Self: ...
+    def __new__(
+        cls,
+        points_m: ArrayLike,
+        feed_m_s: float | ArrayLike,
+        velocity_max_m_s: float | ArrayLike,
+        acceleration_max_m_s2: float | ArrayLike,
+        jerk_max_m_s3: float | ArrayLike,
+        setting: str,
+        start_velocity_m_s: float | ArrayLike,
+    ) -> Self: ...
     @property
     def duration_s(self) -> float: ...
     @property

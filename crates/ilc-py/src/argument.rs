@@ -192,14 +192,7 @@ pub(crate) fn read_numbers(
     object: &Bound<'_, PyAny>,
 ) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let array = in_order(name, object)?;
-    let shape = array.shape().to_vec();
-    let array = array.readonly();
-    // A single copy if the array is contiguous, the usual case.
-    let values = match array.as_slice() {
-        Ok(values) => values.to_vec(),
-        Err(_) => array.as_array().iter().copied().collect(),
-    };
-    Ok((values, shape))
+    Ok((array.to_vec()?, array.shape().to_vec()))
 }
 
 /// Returns an array of float64 in row-major order: the given one itself, if it is one.

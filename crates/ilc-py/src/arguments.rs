@@ -125,16 +125,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
 
     /// Reads one of several words, each with its meaning.
     pub(crate) fn choice<T: Copy>(self, name: &str, choices: &[(&str, T)]) -> PyResult<T> {
-        let word = self.get(name)?;
-        let text = word.cast::<PyString>().map_err(|_| refused(name, &word, "a text"))?.to_str()?;
-        if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
-            return Ok(*meaning);
-        }
-        let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
-        let words = words.join(", ");
-        let (others, last) = words.rsplit_once(", ").unwrap_or(("", &words));
-        let line = format!("{name} = {}; {others} or {last} is needed", shown(&word));
-        Err(PyValueError::new_err(line))
+        choice(name, &self.get(name)?, choices)
     }
 
     /// Reads a time-invariant model.
@@ -212,6 +203,23 @@ impl<'a, 'py> Arguments<'a, 'py> {
         }
         Ok(format!("{name}({})", words.join(", ")))
     }
+}
+
+/// Reads one of several words, each with its meaning.
+pub(crate) fn choice<T: Copy>(
+    name: &str,
+    word: &Bound<'_, PyAny>,
+    choices: &[(&str, T)],
+) -> PyResult<T> {
+    let text = word.cast::<PyString>().map_err(|_| refused(name, word, "a text"))?.to_str()?;
+    if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
+        return Ok(*meaning);
+    }
+    let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
+    let words = words.join(", ");
+    let (others, last) = words.rsplit_once(", ").unwrap_or(("", &words));
+    let line = format!("{name} = {}; {others} or {last} is needed", shown(word));
+    Err(PyValueError::new_err(line))
 }
 
 /// Reads a struct: its fields by their names, each with a reader of [`Arguments`], then others with their values.

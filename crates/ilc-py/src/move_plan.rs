@@ -6,10 +6,10 @@ use pyo3::types::PyTuple;
 
 use crate::answer::{Array, by_name, give_signal, give_vector};
 use crate::argument::{Signal, misfit, read_array};
-use crate::arguments::Arguments;
+use crate::arguments::choice;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::trajectory::{SETTINGS, read_each, read_limits};
+use crate::trajectory::{SETTINGS, limits_of, read_each};
 
 /// Moves planned, or times evaluated, in less than about 100 us: other threads do not wait.
 const FEW: usize = 32;
@@ -27,21 +27,31 @@ pub(crate) struct PyMovePlan {
 
 #[pymethods]
 impl PyMovePlan {
+    /// In place of a dict: reading one takes as long as a plan.
     #[new]
-    fn new(a: Arguments<'_, '_>) -> PyResult<Self> {
-        let Signal { values: points_m, layout } = a.signal("points_m")?;
+    fn new(
+        points_m: &Bound<'_, PyAny>,
+        feed_m_s: &Bound<'_, PyAny>,
+        velocity_max_m_s: &Bound<'_, PyAny>,
+        acceleration_max_m_s2: &Bound<'_, PyAny>,
+        jerk_max_m_s3: &Bound<'_, PyAny>,
+        setting: &Bound<'_, PyAny>,
+        start_velocity_m_s: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let py = points_m.py();
+        let Signal { values: points_m, layout } = Signal::read("points_m", points_m)?;
         let n_axes = layout.n_channels;
-        let each = |name: &str, n| read_each(name, &a.get(name)?, n);
-        let feed_m_s = each("feed_m_s", layout.n_samples - 1)?;
-        let (limits, setting) = (read_limits(a, n_axes)?, a.choice("setting", &SETTINGS)?);
-        let start_velocity_m_s = each("start_velocity_m_s", n_axes)?;
+        let feed_m_s = read_each("feed_m_s", feed_m_s, layout.n_samples - 1)?;
+        let limits = limits_of([velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3], n_axes)?;
+        let setting = choice("setting", setting, &SETTINGS)?;
+        let start_velocity_m_s = read_each("start_velocity_m_s", start_velocity_m_s, n_axes)?;
         let planned = || {
             let (start_m, ends_m) = points_m.split_at(n_axes);
             let segments = PathSegment::lines(ends_m, n_axes, &feed_m_s);
             Linear::plan_moving(start_m, &start_velocity_m_s, &segments, &limits, setting)
         };
         let is_short = layout.n_samples <= FEW;
-        let plan = if is_short { planned() } else { detached(a.py(), planned) }.or_raise()?;
+        let plan = if is_short { planned() } else { detached(py, planned) }.or_raise()?;
         Ok(Self { plan, points_m, feed_m_s, limits, setting, start_velocity_m_s })
     }
 

@@ -17,6 +17,7 @@ use ilc_rt::trajectory::{
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyFloat;
 
 use crate::answer::{ByName, by_name, give_signal};
 use crate::argument::read_vector;
@@ -32,6 +33,9 @@ type Planned = Result<(SampledMotion, Vec<Alpha>), TrajectoryError>;
 /// Settings by name.
 pub(crate) const SETTINGS: [(&str, LinearSetting); 2] =
     [("complete", LinearSetting::CompleteEveryMove), ("on_time", LinearSetting::StartOnTime)];
+
+/// The limits of an axis by name.
+const LIMITS: [&str; 3] = ["velocity_max_m_s", "acceleration_max_m_s2", "jerk_max_m_s3"];
 
 /// Plans a motion while other Python threads run, and returns its samples by name.
 fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> ByName<'_> {
@@ -59,6 +63,9 @@ fn read_points(a: Arguments<'_, '_>) -> PyResult<(Vec<f64>, Vec<f64>)> {
 
 /// Reads a number for all of `n`, or one for each.
 pub(crate) fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<f64>> {
+    if let Ok(value) = object.cast_exact::<PyFloat>() {
+        return Ok(vec![value.value(); n]);
+    }
     // Of an array NumPy would make a number with a warning, or an exception.
     let is_array = object.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0);
     if !is_array && let Ok(value) = object.extract::<f64>() {
@@ -74,15 +81,22 @@ pub(crate) fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyRe
     )))
 }
 
+/// Reads the limits of `n_axes` axes.
+fn read_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<Vec<AxisLimits>> {
+    let [velocity, acceleration, jerk] = LIMITS;
+    limits_of([&a.get(velocity)?, &a.get(acceleration)?, &a.get(jerk)?], n_axes)
+}
+
 /// Reads the limits of `n_axes` axes from those of velocity, acceleration and jerk.
-pub(crate) fn read_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<Vec<AxisLimits>> {
+pub(crate) fn limits_of(
+    each_limit: [&Bound<'_, PyAny>; 3],
+    n_axes: usize,
+) -> PyResult<Vec<AxisLimits>> {
     if !(1..=MAX_AXES).contains(&n_axes) {
         return Err(TrajectoryError::from(MoveError::Axes { n_axes })).or_raise();
     }
-    let each = |name| read_each(name, &a.get(name)?, n_axes);
-    let velocity = each("velocity_max_m_s")?;
-    let acceleration = each("acceleration_max_m_s2")?;
-    let jerk = each("jerk_max_m_s3")?;
+    let each = |i: usize| read_each(LIMITS[i], each_limit[i], n_axes);
+    let [velocity, acceleration, jerk] = [each(0)?, each(1)?, each(2)?];
     let axis = |i| AxisLimits {
         velocity_max_m_s: velocity[i],
         acceleration_max_m_s2: acceleration[i],

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ilc_rt import _native
-from ilc_rt.given import given
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -76,4 +75,7 @@ class MovePlan(_native.MovePlan):
         setting: str = "complete",
         start_velocity_m_s: float | ArrayLike = 0.0,
     ) -> Self:
-        return super().__new__(cls, given(locals()))
+        return super().__new__(
+            cls, points_m, feed_m_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3,
+            setting, start_velocity_m_s,
+        )  # fmt: skip
