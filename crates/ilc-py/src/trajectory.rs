@@ -63,17 +63,39 @@ fn read_points(a: Arguments<'_, '_>) -> PyResult<(Vec<f64>, Vec<f64>)> {
 
 /// Reads a number for all of `n`, or one for each.
 pub(crate) fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<f64>> {
+    Ok(match read_all(name, object, n)? {
+        All::Alike(value) => vec![value; n],
+        All::Each(values) => values,
+    })
+}
+
+/// A number for all, or one for each.
+enum All {
+    Alike(f64),
+    Each(Vec<f64>),
+}
+
+impl All {
+    fn of(&self, index: usize) -> f64 {
+        match self {
+            Self::Alike(value) => *value,
+            Self::Each(values) => values[index],
+        }
+    }
+}
+
+fn read_all(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyResult<All> {
     if let Ok(value) = object.cast_exact::<PyFloat>() {
-        return Ok(vec![value.value(); n]);
+        return Ok(All::Alike(value.value()));
     }
     // Of an array NumPy would make a number with a warning, or an exception.
     let is_array = object.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0);
     if !is_array && let Ok(value) = object.extract::<f64>() {
-        return Ok(vec![value; n]);
+        return Ok(All::Alike(value));
     }
     let values = read_vector(name, object)?;
     if values.len() == n {
-        return Ok(values);
+        return Ok(All::Each(values));
     }
     Err(PyValueError::new_err(format!(
         "{name} has {} entries; a number, or {n} of them, is needed",
@@ -95,12 +117,12 @@ pub(crate) fn limits_of(
     if !(1..=MAX_AXES).contains(&n_axes) {
         return Err(TrajectoryError::from(MoveError::Axes { n_axes })).or_raise();
     }
-    let each = |i: usize| read_each(LIMITS[i], each_limit[i], n_axes);
-    let [velocity, acceleration, jerk] = [each(0)?, each(1)?, each(2)?];
+    let all = |i: usize| read_all(LIMITS[i], each_limit[i], n_axes);
+    let [velocity, acceleration, jerk] = [all(0)?, all(1)?, all(2)?];
     let axis = |i| AxisLimits {
-        velocity_max_m_s: velocity[i],
-        acceleration_max_m_s2: acceleration[i],
-        jerk_max_m_s3: jerk[i],
+        velocity_max_m_s: velocity.of(i),
+        acceleration_max_m_s2: acceleration.of(i),
+        jerk_max_m_s3: jerk.of(i),
     };
     Ok((0..n_axes).map(axis).collect())
 }

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
+_new = _native.MovePlan.__new__
+
+
 class MovePlan(_native.MovePlan):
     """Straight moves with jerk-limited (S-curve) axes, planned without samples.
 
@@ -64,6 +67,8 @@ class MovePlan(_native.MovePlan):
     array([0., 2., 0.])
     """
 
+    __slots__ = ()
+
     def __new__(
         cls,
         points_m: ArrayLike,
@@ -75,7 +80,7 @@ class MovePlan(_native.MovePlan):
         setting: str = "complete",
         start_velocity_m_s: float | ArrayLike = 0.0,
     ) -> Self:
-        return super().__new__(
+        return _new(
             cls, points_m, feed_m_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3,
             setting, start_velocity_m_s,
         )  # fmt: skip

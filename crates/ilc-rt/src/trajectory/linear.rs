@@ -160,8 +160,8 @@ impl Linear {
         }));
         let latest_s = |axes: &[ToRest]| axes.iter().map(ToRest::duration_s).fold(0.0, f64::max);
         let slowest_s = latest_s(&self.axes[first..]);
-        for (motion, limits) in self.axes[first..].iter_mut().zip(limits) {
-            *motion = motion.slowed(limits, slowest_s);
+        for motion in &mut self.axes[first..] {
+            *motion = motion.slowed(slowest_s);
         }
         latest_s(&self.axes[first..])
     }

@@ -11,6 +11,7 @@ use crate::interpolate::AxisLimits;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ToRest {
     start: AxisState,
+    way: Approach,
     phases: [(f64, f64); 7],
     /// Velocity between the ramps, without sign.
     cruise: f64,
@@ -29,18 +30,17 @@ impl ToRest {
     ) -> Self {
         let way = Approach::new(start, target_m, limits);
         let cruise = way.fastest(cruise_max_m_s);
-        Self { start, phases: way.phases(cruise), cruise, target_m }
+        Self { start, way, phases: way.phases(cruise), cruise, target_m }
     }
 
     /// Returns the motion that arrives at `duration_s` by cruising slower, or as late before it as
     /// possible; the same one if it is not earlier.
-    pub(super) fn slowed(self, limits: &AxisLimits, duration_s: f64) -> Self {
+    pub(super) fn slowed(self, duration_s: f64) -> Self {
         if self.cruise == 0.0 || self.duration_s() >= duration_s {
             return self;
         }
-        let way = Approach::new(self.start, self.target_m, limits);
-        let cruise = way.slower(self.cruise, duration_s);
-        Self { phases: way.phases(cruise), cruise, ..self }
+        let cruise = self.way.slower(self.cruise, duration_s);
+        Self { phases: self.way.phases(cruise), cruise, ..self }
     }
 
     pub(super) fn duration_s(&self) -> f64 {

@@ -62,7 +62,8 @@ impl Case {
         let [a, b, c] = ramp(self.start.v, self.start.a, cruise, &self.limits);
         let [d, e, f] = ramp(cruise, 0.0, 0.0, &self.limits);
         let phases = [a, b, c, (cruise_s, 0.0), d, e, f];
-        ToRest { start: self.start, phases, cruise, target_m: self.target_m }
+        let way = Approach::new(self.start, self.target_m, &self.limits);
+        ToRest { start: self.start, way, phases, cruise, target_m: self.target_m }
     }
 
     /// The distance that the ramps to a cruise and from it leave.
@@ -194,7 +195,7 @@ fn a_slower_motion_arrives_in_time_and_early_only_if_there_is_none() {
         let case = Case::random(&mut random, false);
         let fastest = case.fastest();
         let duration_s = fastest.duration_s() * (1.0 + random.log(1e-9, 10.0));
-        let motion = fastest.slowed(&case.limits, duration_s);
+        let motion = fastest.slowed(duration_s);
         case.assert_arrives(&motion);
         assert!(motion.duration_s() <= duration_s * (1.0 + 1e-14), "{case:?} {motion:?}");
         if fastest.cruise == 0.0 || motion.duration_s() >= duration_s * (1.0 - 1e-9) {
@@ -243,7 +244,7 @@ fn where_there_is_one_root_it_is_that_of_the_bisection() {
         };
         assert_same(&motion, &bisected);
         let duration_s = motion.duration_s() * (1.0 + random.log(1e-9, 10.0));
-        let slower = motion.slowed(&case.limits, duration_s);
+        let slower = motion.slowed(duration_s);
         assert_same(&slower, &case.bisected_slower(bisected.cruise, duration_s));
     }
     assert!(n_compared > 50_000 && 2 * n_same > n_compared, "{n_same} of {n_compared}");
