@@ -40,6 +40,8 @@ class Served:
 
     def __init__(self, folder: Path, browser: Browser) -> None:
         self.browser = browser
+        # For all that is expected below; five seconds are few for a loaded machine.
+        sync_api.expect.set_options(timeout=WAIT_MS)
         self.library = Library(folder / "odd.db")
         for number in range(4):
             error = np.full((40, 1), 1e-4 / (1 + number))
@@ -109,7 +111,7 @@ def test_a_chart_that_shows_nothing_says_why(served: Served) -> None:
 def test_names_are_texts_and_found(served: Served) -> None:
     """Blanks, letters of every script, markup; what is too long does not widen the page."""
     page = served.page("/library", width=390)
-    sync_api.expect(page.locator("[data-run]")).to_have_count(8, timeout=WAIT_MS)
+    sync_api.expect(page.locator("[data-run]")).to_have_count(8)
     for wanted, cell in (("機械", "機械 ünïcode"), ("my cell", "my cell"), ("<b>", "<b>x</b>")):
         page.fill('input[type="search"]', wanted)
         sync_api.expect(page.locator("[data-run]")).to_have_count(1)

@@ -120,7 +120,7 @@ def wait(page: Page, name: str, part: str) -> str:
 
 
 def wait_for(page: Page, expression: str) -> None:
-    """Wait until a JavaScript expression of the page is true; while it is built there is none."""
+    """Wait until a JavaScript expression is true; one that fails, as on a new page, is not yet."""
     page.wait_for_function(f"() => {{ try {{ return {expression} }} catch {{ return false }} }}")
 
 

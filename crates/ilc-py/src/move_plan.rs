@@ -27,7 +27,7 @@ pub(crate) struct PyMovePlan {
 
 #[pymethods]
 impl PyMovePlan {
-    /// In place of a dict: reading one takes as long as a plan.
+    /// Takes its arguments by position: reading them from a dict would take as long as a plan.
     #[new]
     fn new(
         points_m: &Bound<'_, PyAny>,
