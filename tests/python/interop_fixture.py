@@ -123,11 +123,18 @@ def running(*arguments: str, cell: Path = CELL) -> Iterator[tuple[Sim, canopen.N
     try:
         yield sim, network
     finally:
-        for node in network.values():
-            node.rpdo.stop()
-        network.sync.stop()
-        network.disconnect()
+        disconnect(network)
         sim.stop()
+
+
+def disconnect(network: canopen.Network) -> None:
+    """End what a network sends periodically, wait for its last frames, and close its bus."""
+    network.bus.stop_all_periodic_tasks()
+    # `stop` sets a flag only: its thread may be on the way to the bus, which must still be open.
+    for thread in threading.enumerate():
+        if thread.name.startswith("Cyclic send task"):
+            thread.join()
+    network.disconnect()
 
 
 def data_sheet(path: Path, cell: Path = CELL, node: int = 1) -> Path:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import can
 import canopen
 import pytest
-from interop_fixture import data_sheet, find_sim
+from interop_fixture import data_sheet, disconnect, find_sim
 from local_drive_fixture import LocalDrive
 from ports_fixture import GROUP, free_port
 
@@ -75,7 +75,7 @@ def test_a_python_slave_is_brought_up_and_follows(tmp_path: Path, quirks: str) -
             capture_output=True, text=True, timeout=120, check=False,
         )  # fmt: skip
     finally:
-        network.disconnect()
+        disconnect(network)
     assert run.returncode == 0, run.stderr
     first, second = json.loads((tmp_path / "run.json").read_text())["iterations"]
     assert first["missing_samples"] == second["missing_samples"] == 0
