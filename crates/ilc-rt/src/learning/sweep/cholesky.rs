@@ -94,6 +94,16 @@ pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
     solve_transposed(lower, m, x);
 }
 
+/// Writes `H^-1` (m x m), zero in null directions; nothing without room for it.
+#[inline(always)]
+pub(super) fn invert(lower: &[f64], m: usize, inverse: &mut [f64]) {
+    for (j, column) in inverse.chunks_exact_mut(m).enumerate() {
+        column.fill(0.0);
+        column[j] = 1.0;
+        solve(lower, m, column);
+    }
+}
+
 /// Replaces `x` by `L'^-1 x`, zero in null directions.
 #[inline(always)]
 pub(super) fn solve_transposed(lower: &[f64], m: usize, x: &mut [f64]) {

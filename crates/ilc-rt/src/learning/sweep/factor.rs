@@ -64,6 +64,8 @@ pub struct Gains {
     back: Vec<f64>,
     fore: Vec<f64>,
     n_stored: usize,
+    /// `H^-1` (m x m) of each sample, from the end, if weights alone vary along the run.
+    inverse: Vec<f64>,
     /// Number of sets before the steady-state one, and the number of samples that one serves; 0 if
     /// there is none.
     n_tail: usize,
@@ -118,6 +120,7 @@ impl Gains {
             back: Vec::new(),
             fore: Vec::new(),
             n_stored: 0,
+            inverse: Vec::new(),
             n_tail: 0,
             n_settled: 0,
             pivots: Pivots::NONE,
@@ -129,6 +132,10 @@ impl Gains {
         if stages.constant().is_empty() {
             gains.back.resize(n_samples * sizes.back(), 0.0);
             gains.fore.resize(n_samples * sizes.fore(), 0.0);
+            if stages.has_constant_plant() {
+                gains.inverse.resize(n_samples * m * m, 0.0);
+                gains.recursion.inverse.resize(m * m, 0.0);
+            }
         }
         gains.refactor(stages)?;
         Ok(gains)
@@ -256,6 +263,12 @@ impl Gains {
         }
     }
 
+    /// Returns `H^-1` of sample `k` (m x m); `None` unless weights alone vary along the run.
+    pub(super) fn inverse(&self, k: usize) -> Option<&[f64]> {
+        let size = self.sizes.m * self.sizes.m;
+        self.inverse.get((self.n_samples - 1 - k) * size..)?.get(..size)
+    }
+
     /// Returns the gains in steady state, if it is reached.
     pub(super) fn settled(&self) -> Option<Record<'_>> {
         (self.n_settled > 0).then(|| self.at(self.n_samples - 1 - self.n_tail))
@@ -279,7 +292,13 @@ impl Gains {
         }
         let back = &mut self.back[first_back..first_back + back];
         let fore = &mut self.fore[first_fore..first_fore + fore];
-        self.recursion.step(&self.stage, back, fore)
+        let pivots = self.recursion.step(&self.stage, back, fore);
+        let size = self.recursion.inverse.len();
+        if size > 0 {
+            let place = (self.n_stored - 1) * size;
+            self.inverse[place..place + size].copy_from_slice(&self.recursion.inverse);
+        }
+        pivots
     }
 
     /// `passed <- passed (A - B K)`.

@@ -23,6 +23,8 @@ pub(super) struct Room<'a> {
     pub(super) transition: &'a mut [f64],
     /// `Q C` (p x n).
     pub(super) weighted_c: &'a mut [f64],
+    /// `H^-1` (m x m), or no room for it.
+    pub(super) inverse: &'a mut [f64],
 }
 
 /// Pivots, Cholesky factor of `H` and `K` (m x n) that another form has found, with its cost.
@@ -174,6 +176,7 @@ fn sized<const N: usize, const M: usize, const P: usize>(
     from_drive.copy_from_slice(b.as_flattened());
     room.transition.copy_from_slice(transition.as_flattened());
     room.weighted_c.copy_from_slice(weighted_c.as_flattened());
+    cholesky::invert(lower, M, room.inverse);
     pivots
 }
 

@@ -11,7 +11,7 @@ use super::steps::{below, rows};
 use super::wide::Wide;
 
 /// Remainder of a state after the warm-up.
-const FORGOTTEN: f64 = 1e-18;
+pub(super) const FORGOTTEN: f64 = 1e-18;
 /// Largest remainder of a state after a whole segment: rounding errors must fade from cut to cut.
 const FADED: f64 = 0.1;
 

@@ -18,13 +18,15 @@
 //!
 //! The sweeps take several samples at one step, whose gains `steps` multiplies out: `fixed` for sizes
 //! known at compile time, `general` for any, and `single` for one axis in several segments at a time
-//! (`lanes`).
+//! (`lanes`). `varying` takes several segments at a time as well, sample by sample, each with gains of
+//! its own.
 
 mod cholesky;
 mod factor;
 mod fixed;
 mod fixed_step;
 mod general;
+mod interleaved;
 mod inverse;
 mod lane_step;
 mod lanes;
@@ -36,6 +38,8 @@ mod square_root;
 mod stage;
 mod steps;
 mod tile;
+mod varying;
+mod varying_step;
 pub(in crate::learning) mod wide;
 
 pub use factor::{FactorError, Form, Gains};
@@ -82,9 +86,9 @@ pub trait Sweep: Send + std::fmt::Debug {
 }
 
 /// Returns the fastest solver for the given channels.
-pub fn solver(gains: &Gains, channels: Channels) -> Box<dyn Sweep> {
-    match single::single(gains, &channels, Instructions::best()) {
-        Some(solver) => solver,
-        None => Box::new(General::new(gains, channels)),
-    }
+pub fn solver(gains: &Gains, stages: &impl Stages, channels: Channels) -> Box<dyn Sweep> {
+    let how = Instructions::best();
+    single::single(gains, &channels, how)
+        .or_else(|| varying::varying(gains, stages, &channels, how))
+        .unwrap_or_else(|| Box::new(General::new(gains, channels)))
 }

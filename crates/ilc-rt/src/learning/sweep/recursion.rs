@@ -29,6 +29,8 @@ pub(super) struct Recursion {
     feedback: Vec<f64>,
     /// `A - B K` (n x n).
     pub(super) transition: Vec<f64>,
+    /// `H^-1` (m x m), or no room for it.
+    pub(super) inverse: Vec<f64>,
     /// `C - D K` (p x n), and `Q` times it.
     left: Vec<f64>,
     weighted_left: Vec<f64>,
@@ -55,6 +57,7 @@ impl Recursion {
             lower: room(m * m),
             feedback: room(m * n),
             transition: room(n * n),
+            inverse: Vec::new(),
             left: room(p * n),
             weighted_left: room(p * n),
             effort: room(m * m),
@@ -82,8 +85,8 @@ impl Recursion {
             self.root.step(*form, *instructions, stage, &self.effort, cost, gains)
         });
         let given = solved.map(|pivots| (pivots, &lower[..], &feedback[..]));
-        let (transition, weighted_c) = (&mut self.transition, &mut self.weighted_c);
-        let room = fixed_step::Room { later, cost, transition, weighted_c };
+        let Self { transition, weighted_c, inverse, .. } = self;
+        let room = fixed_step::Room { later, cost, transition, weighted_c, inverse };
         fixed_step::step(*instructions, *sizes, stage, given, room, back, fore)
             .unwrap_or_else(|| self.any(stage, solved, back, fore))
     }
@@ -209,6 +212,7 @@ impl Recursion {
             }
         }
         fore[n * rows..].copy_from_slice(b);
+        cholesky::invert(lower, m, &mut self.inverse);
         pivots
     }
 

@@ -177,7 +177,7 @@ impl NormOptimal {
         self.conditioning = self.conditioning.min(gains.conditioning());
         let shift = channels.shifts.iter().copied().max().unwrap_or(0);
         self.n_unread = self.n_unread.max(shift.min(self.n_samples));
-        self.parts.push(sweep::solver(&gains, channels));
+        self.parts.push(sweep::solver(&gains, stages, channels));
         Ok(())
     }
 
