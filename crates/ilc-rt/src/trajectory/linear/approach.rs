@@ -32,7 +32,9 @@ pub(super) struct Approach {
 
 /// The two ramps: one to the cruising velocity, one from it to rest.
 #[derive(Clone, Copy, Debug)]
-struct Ramps {
+pub(super) struct Ramps {
+    /// Cruising velocity, without sign.
+    pub(super) cruise: f64,
     first: Ramp,
     last: Ramp,
     /// Derivative of the last ramp's distance.
@@ -50,6 +52,25 @@ struct Ramp {
     rise_s: f64,
     hold_s: f64,
     ease_s: f64,
+}
+
+/// An end of an interval of cruising velocities, with its ramps if they have been computed.
+#[derive(Clone, Copy)]
+struct Tried {
+    cruise: f64,
+    ramps: Option<Ramps>,
+}
+
+impl Tried {
+    fn new(cruise: f64) -> Self {
+        Self { cruise, ramps: None }
+    }
+}
+
+impl From<Ramps> for Tried {
+    fn from(ramps: Ramps) -> Self {
+        Self { cruise: ramps.cruise, ramps: Some(ramps) }
+    }
 }
 
 impl Ramp {
@@ -93,14 +114,15 @@ impl Approach {
         }
     }
 
-    /// Returns the cruising velocity of the fastest motion; 0 for a direct stop.
-    pub(super) fn fastest(&self, cruise_max_m_s: f64) -> f64 {
+    /// Returns the ramps of the fastest motion; those of a direct stop cruise at 0.
+    pub(super) fn fastest(&self, cruise_max_m_s: f64) -> Ramps {
         if self.beyond_stop == 0.0 {
-            return 0.0;
+            return self.ramps(0.0);
         }
         let reaches = |cruise: f64| self.left(&self.ramps(cruise)) >= 0.0;
-        if reaches(cruise_max_m_s) {
-            cruise_max_m_s
+        let quickest = self.ramps(cruise_max_m_s);
+        if self.left(&quickest) >= 0.0 {
+            quickest
         } else if self.eased > 0.0 && (cruise_max_m_s <= self.eased || !reaches(self.eased)) {
             // Below the present velocity the distance rises with that of the cruise, then falls.
             let above = self.eased.min(cruise_max_m_s);
@@ -111,31 +133,38 @@ impl Approach {
         }
     }
 
-    /// Returns the slowest cruising velocity, not above the fastest one, that arrives no later than
-    /// `duration_s`.
-    pub(super) fn slower(&self, fastest: f64, duration_s: f64) -> f64 {
-        let arrives = |cruise: f64| {
-            let ramps = self.ramps(cruise);
-            let (left, cruise_s) = (self.left(&ramps), duration_s - ramps.duration_s());
+    /// Returns the ramps of the slowest cruise, not faster than the fastest one, that arrives no
+    /// later than `duration_s`.
+    pub(super) fn slower(&self, fastest: &Ramps, duration_s: f64) -> Ramps {
+        let arrives = |ramps: &Ramps| {
+            let (left, cruise_s) = (self.left(ramps), duration_s - ramps.duration_s());
             // `c (T - duration)`, T with the cruise; its derivative is finite everywhere.
-            let late = left - cruise * cruise_s;
+            let late = left - ramps.cruise * cruise_s;
             let slope = -(ramps.first.peak + ramps.last.peak) / (2.0 * self.jerk) - cruise_s;
-            (late <= 0.0 && left >= 0.0, cruise - late / slope)
+            (late <= 0.0 && left >= 0.0, ramps.cruise - late / slope)
         };
-        let within = |fast: f64| narrowed(fast, 0.0, arrives(fast).1, 8.0 * f64::EPSILON, arrives);
-        let (found, lower) = within(fastest);
-        if self.eased <= 0.0 || self.left(&self.ramps(lower)) >= 0.0 {
+        let within = |fast: &Ramps| {
+            let ends = [Tried::from(*fast), Tried::new(0.0)];
+            self.narrowed(ends, arrives(fast).1, 8.0 * f64::EPSILON, arrives)
+        };
+        let [found, lower] = within(fastest);
+        let found = self.known(found);
+        if self.eased <= 0.0 {
+            return found;
+        }
+        let lower = self.known(lower);
+        if self.left(&lower) >= 0.0 {
             return found;
         }
         // Slightly slower cruises go too far; those below another root do not.
-        let slow = self.reaching(0.0, lower, 0.5 * lower);
-        if arrives(slow).0 { within(slow).0 } else { found }
+        let slow = self.reaching(0.0, lower.cruise, 0.5 * lower.cruise);
+        if arrives(&slow).0 { self.known(within(&slow)[0]) } else { found }
     }
 
     /// Returns duration and jerk of the seven phases: the cruise lasts for what the ramps leave.
-    pub(super) fn phases(&self, cruise: f64) -> [(f64, f64); 7] {
-        let ramps = self.ramps(cruise);
-        let cruise_s = if cruise == 0.0 { 0.0 } else { (self.left(&ramps) / cruise).max(0.0) };
+    pub(super) fn phases(&self, ramps: &Ramps) -> [(f64, f64); 7] {
+        let Ramps { cruise, .. } = *ramps;
+        let cruise_s = if cruise == 0.0 { 0.0 } else { (self.left(ramps) / cruise).max(0.0) };
         let [a, b, c] = ramps.first.phases(self.sense * self.jerk);
         let [d, e, f] = ramps.last.phases(self.sense * self.jerk);
         [a, b, c, (cruise_s, 0.0), d, e, f]
@@ -146,17 +175,52 @@ impl Approach {
         self.distance - ramps.distance
     }
 
-    /// Returns the velocity next to the root in an interval at whose lower end the ramps do not go
-    /// too far, and do at its upper one.
-    fn reaching(&self, below: f64, above: f64, guess: f64) -> f64 {
-        let (found, _) = narrowed(below, above, guess, 0.0, |cruise| {
-            let ramps = self.ramps(cruise);
-            let Ramp { sign, peak, .. } = ramps.first;
+    /// Returns the ramps next to the root in an interval of velocities at whose lower end they do not
+    /// go too far, and do at its upper one.
+    fn reaching(&self, below: f64, above: f64, guess: f64) -> Ramps {
+        let [found, _] = self.narrowed([below, above].map(Tried::new), guess, 0.0, |ramps| {
+            let (Ramp { sign, peak, .. }, cruise) = (ramps.first, ramps.cruise);
             let slope = sign * cruise / peak + peak / (2.0 * self.jerk) + ramps.last_slope;
-            let left = self.left(&ramps);
+            let left = self.left(ramps);
             (left >= 0.0, cruise + left / slope)
         });
-        found
+        self.known(found)
+    }
+
+    /// Narrows an interval of velocities to a share of its ends, for 0 until they are neighbouring
+    /// numbers, and returns first the end at which the test is true.
+    ///
+    /// The test also returns Newton's next value; near the root that value is moved across it, so
+    /// that both ends close in. A value outside the interval is replaced by its middle.
+    fn narrowed(
+        &self,
+        [mut inside, mut outside]: [Tried; 2],
+        guess: f64,
+        share: f64,
+        test: impl Fn(&Ramps) -> (bool, f64),
+    ) -> [Tried; 2] {
+        let mut next = guess;
+        for step in 0..STEPS {
+            let (at, other) = (inside.cruise, outside.cruise);
+            let is_between = |next: f64| at.min(other) < next && next < at.max(other);
+            if !is_between(next) || (step > NEWTON_STEPS && step % 2 == 0) {
+                next = 0.5 * (at + other);
+            }
+            if !is_between(next) || (at - other).abs() <= share * at.abs() {
+                break;
+            }
+            let ramps = self.ramps(next);
+            let (is_inside, newton) = test(&ramps);
+            let (end, other) = if is_inside { (&mut inside, other) } else { (&mut outside, at) };
+            *end = Tried::from(ramps);
+            next = newton + (2.0 * f64::EPSILON * newton.abs()).copysign(other - newton);
+        }
+        [inside, outside]
+    }
+
+    /// Returns the ramps of an end.
+    fn known(&self, Tried { cruise, ramps }: Tried) -> Ramps {
+        ramps.unwrap_or_else(|| self.ramps(cruise))
     }
 
     /// Approaches the root above the eased velocity, where the first ramp accelerates.
@@ -194,7 +258,7 @@ impl Approach {
     }
 
     /// Returns the ramps to a cruising velocity and from it to rest.
-    fn ramps(&self, cruise: f64) -> Ramps {
+    pub(super) fn ramps(&self, cruise: f64) -> Ramps {
         let jerk = self.jerk;
         let sign = if cruise < self.eased { -1.0 } else { 1.0 };
         let (v, a, c) = (sign * self.velocity, sign * self.acceleration, sign * cruise);
@@ -206,6 +270,7 @@ impl Approach {
             + ease_s * (c - ease_s * peak / 6.0);
         let last_slope = if last.hold_s > 0.0 { cruise / last.peak } else { last.ease_s };
         Ramps {
+            cruise,
             first,
             last,
             last_slope: last_slope + 0.5 * last.ease_s,
@@ -231,34 +296,4 @@ impl Ramps {
     fn duration_s(&self) -> f64 {
         self.first.duration_s() + self.last.duration_s()
     }
-}
-
-/// Narrows an interval to a share of its ends, for 0 until they are neighbouring numbers, and
-/// returns first the end at which the test is true.
-///
-/// The test also returns Newton's next value; near the root that value is moved across it, so that
-/// both ends close in. A value outside the interval is replaced by its middle.
-fn narrowed(
-    mut inside: f64,
-    mut outside: f64,
-    guess: f64,
-    share: f64,
-    test: impl Fn(f64) -> (bool, f64),
-) -> (f64, f64) {
-    let mut next = guess;
-    for step in 0..STEPS {
-        let is_between = |at: f64| inside.min(outside) < at && at < inside.max(outside);
-        if !is_between(next) || (step > NEWTON_STEPS && step % 2 == 0) {
-            next = 0.5 * (inside + outside);
-        }
-        if !is_between(next) || (inside - outside).abs() <= share * inside.abs() {
-            break;
-        }
-        let (is_inside, newton) = test(next);
-        let end = if is_inside { &mut inside } else { &mut outside };
-        *end = next;
-        let other = if is_inside { outside } else { inside };
-        next = newton + (2.0 * f64::EPSILON * newton.abs()).copysign(other - newton);
-    }
-    (inside, outside)
 }

@@ -3,7 +3,7 @@
 //!
 //! The axis goes to a cruising velocity and from it to rest; [`Approach`] finds the one that arrives.
 
-use super::approach::Approach;
+use super::approach::{Approach, Ramps};
 use super::axis_state::AxisState;
 use crate::interpolate::AxisLimits;
 
@@ -12,9 +12,8 @@ use crate::interpolate::AxisLimits;
 pub(super) struct ToRest {
     start: AxisState,
     way: Approach,
+    ramps: Ramps,
     phases: [(f64, f64); 7],
-    /// Velocity between the ramps, without sign.
-    cruise: f64,
     target_m: f64,
 }
 
@@ -29,18 +28,18 @@ impl ToRest {
         cruise_max_m_s: f64,
     ) -> Self {
         let way = Approach::new(start, target_m, limits);
-        let cruise = way.fastest(cruise_max_m_s);
-        Self { start, way, phases: way.phases(cruise), cruise, target_m }
+        let ramps = way.fastest(cruise_max_m_s);
+        Self { start, way, phases: way.phases(&ramps), ramps, target_m }
     }
 
     /// Returns the motion that arrives at `duration_s` by cruising slower, or as late before it as
     /// possible; the same one if it is not earlier.
     pub(super) fn slowed(self, duration_s: f64) -> Self {
-        if self.cruise == 0.0 || self.duration_s() >= duration_s {
+        if self.ramps.cruise == 0.0 || self.duration_s() >= duration_s {
             return self;
         }
-        let cruise = self.way.slower(self.cruise, duration_s);
-        Self { phases: self.way.phases(cruise), cruise, ..self }
+        let ramps = self.way.slower(&self.ramps, duration_s);
+        Self { phases: self.way.phases(&ramps), ramps, ..self }
     }
 
     pub(super) fn duration_s(&self) -> f64 {

@@ -63,7 +63,7 @@ impl Case {
         let [d, e, f] = ramp(cruise, 0.0, 0.0, &self.limits);
         let phases = [a, b, c, (cruise_s, 0.0), d, e, f];
         let way = Approach::new(self.start, self.target_m, &self.limits);
-        ToRest { start: self.start, way, phases, cruise, target_m: self.target_m }
+        ToRest { start: self.start, way, phases, ramps: way.ramps(cruise), target_m: self.target_m }
     }
 
     /// The distance that the ramps to a cruise and from it leave.
@@ -106,7 +106,7 @@ impl Case {
 
     /// The cruise of a motion with its sign.
     fn signed(&self, motion: &ToRest) -> f64 {
-        motion.cruise.copysign(self.left(0.0))
+        motion.ramps.cruise.copysign(self.left(0.0))
     }
 
     /// The way that a motion takes, there and back: rounding is a share of it.
@@ -182,7 +182,7 @@ fn every_motion_arrives_within_the_limits_and_none_by_bisection_is_faster() {
         let near_s = [-rounding_m, rounding_m].map(|shift_m| {
             Case { target_m: case.target_m + shift_m, ..case }.bisected().duration_s()
         });
-        let allowed_s = near_s[0].max(near_s[1]) + rounding_m / motion.cruise;
+        let allowed_s = near_s[0].max(near_s[1]) + rounding_m / motion.ramps.cruise;
         assert!(motion.duration_s() <= allowed_s * (1.0 + 1e-12), "{near_s:?} {case:?} {motion:?}");
     }
     assert!(n_faster > 5_000, "several roots must occur: {n_faster}");
@@ -198,7 +198,7 @@ fn a_slower_motion_arrives_in_time_and_early_only_if_there_is_none() {
         let motion = fastest.slowed(duration_s);
         case.assert_arrives(&motion);
         assert!(motion.duration_s() <= duration_s * (1.0 + 1e-14), "{case:?} {motion:?}");
-        if fastest.cruise == 0.0 || motion.duration_s() >= duration_s * (1.0 - 1e-9) {
+        if fastest.ramps.cruise == 0.0 || motion.duration_s() >= duration_s * (1.0 - 1e-9) {
             continue;
         }
         n_early += 1;
@@ -232,9 +232,9 @@ fn where_there_is_one_root_it_is_that_of_the_bisection() {
         }
         let (motion, bisected) = (case.fastest(), case.bisected());
         n_compared += 1;
-        n_same += i32::from(case.signed(&motion) == bisected.cruise);
+        n_same += i32::from(case.signed(&motion) == bisected.ramps.cruise);
         let assert_same = |motion: &ToRest, bisected: &ToRest| {
-            let cruises = case.signed(motion) / bisected.cruise;
+            let cruises = case.signed(motion) / bisected.ramps.cruise;
             let durations = motion.duration_s() / bisected.duration_s();
             assert!((cruises - 1.0).abs() < 1e-10, "{cruises} {case:?} {motion:?} {bisected:?}");
             assert!(
@@ -245,7 +245,7 @@ fn where_there_is_one_root_it_is_that_of_the_bisection() {
         assert_same(&motion, &bisected);
         let duration_s = motion.duration_s() * (1.0 + random.log(1e-9, 10.0));
         let slower = motion.slowed(duration_s);
-        assert_same(&slower, &case.bisected_slower(bisected.cruise, duration_s));
+        assert_same(&slower, &case.bisected_slower(bisected.ramps.cruise, duration_s));
     }
     assert!(n_compared > 50_000 && 2 * n_same > n_compared, "{n_same} of {n_compared}");
 }
