@@ -21,8 +21,8 @@ readable! {
     iterations: Count(law.iterations()),
     gap: Number(law.gap());
 
-    fn is_long(&self) -> bool {
-        true
+    fn in_place_max(&self) -> usize {
+        0
     }
 }
 

@@ -1,8 +1,8 @@
 //! Exchange of an update's arrays between NumPy and a law.
 //!
-//! Row-major arrays of float64 are read in place. Long updates run with the interpreter released,
-//! on a copy, as other Python threads may write into the arrays meanwhile. The memory of the copies
-//! is kept from update to update: fresh memory of this size costs more than the update itself.
+//! Row-major arrays of float64 are read in place. Updates that take long run with the interpreter
+//! released, on a copy, as other Python threads may write into the arrays meanwhile. The memory of the
+//! copies is kept from update to update: fresh memory of this size costs more than the update itself.
 
 use std::ops::Range;
 
@@ -17,8 +17,8 @@ use super::Readable;
 use crate::argument::{Layout, in_order, misfit, refuse_infinite};
 use crate::detached::detached;
 
-/// Number of values up to which an update is faster than releasing the interpreter and copying.
-const SHORT: usize = 8192;
+/// Number of values up to which a new array is cleared in less time than `numpy.empty` is called.
+const SHORT: usize = 4096;
 /// Values copied and checked at a time: they stay in the first-level cache.
 const PIECE: usize = 2048;
 
@@ -78,6 +78,8 @@ pub(super) struct Signals<'py> {
     pub(super) error: Given<'py>,
     /// Array of the next input; a new one if it is not given.
     out: Option<Out<'py>>,
+    /// True if input and error have been copied.
+    are_copied: bool,
 }
 
 /// An array of the caller for the next input.
@@ -88,18 +90,20 @@ struct Out<'py> {
 }
 
 impl<'py> Signals<'py> {
-    /// Reads the signals, of finite numbers.
+    /// Reads the signals, of finite numbers; copies them if they have more than `in_place_max` values.
     pub(super) fn read(
         u: &Bound<'py, PyAny>,
         e: &Bound<'py, PyAny>,
         out: Option<&Bound<'py, PyAny>>,
         copies: &mut Copies,
+        in_place_max: usize,
     ) -> PyResult<Self> {
         let (input, error) = (Given::of("u", u)?, Given::of("e", e)?);
         let out = out.map(|out| Out::read(out, &input, &error)).transpose()?;
-        let signals = Self { input, error, out };
-        if signals.is_long() {
+        let mut signals = Self { input, error, out, are_copied: false };
+        if signals.len() > in_place_max {
             signals.copy(copies)?;
+            signals.are_copied = true;
         } else {
             for given in [&signals.input, &signals.error] {
                 refuse_infinite(given.name, given.values()?, given.array.shape())?;
@@ -108,8 +112,9 @@ impl<'py> Signals<'py> {
         Ok(signals)
     }
 
-    fn is_long(&self) -> bool {
-        self.input.array.len() + self.error.array.len() > SHORT
+    /// Returns the number of values of input and error.
+    fn len(&self) -> usize {
+        self.input.array.len() + self.error.array.len()
     }
 
     fn copy(&self, copies: &mut Copies) -> PyResult<()> {
@@ -125,21 +130,23 @@ impl<'py> Signals<'py> {
         copies: &mut Copies,
         calls_python: bool,
     ) -> PyResult<Result<Bound<'py, PyAny>, LearningError>> {
-        let is_long = self.is_long();
+        let are_copied = self.are_copied;
         let is_input = self.out.as_ref().is_some_and(|out| out.is_input);
         let next = match &self.out {
             Some(out) => out.array.clone(),
-            None if is_long => empty(py, self.input.array.shape())?,
+            None if self.input.array.len() > SHORT => empty(py, self.input.array.shape())?,
             None => PyArrayDyn::<f64>::zeros(py, IxDyn(self.input.array.shape()), false),
         };
-        if !(is_long || is_input || calls_python || law.is_long()) {
+        // The first run may have made another law.
+        let is_quick = !are_copied && self.len() <= law.in_place_max();
+        if is_quick && !is_input && !calls_python {
             let mut place = next.try_readwrite()?;
             let place = place.as_slice_mut()?;
             let done = law.update(self.input.values()?, self.error.values()?, place);
             drop(self);
             return Ok(done.map(|()| next.into_any()));
         }
-        if !is_long {
+        if !are_copied {
             self.copy(copies)?;
         }
         // Ends the use of the arrays: one of them may be written now.

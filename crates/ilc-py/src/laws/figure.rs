@@ -43,9 +43,10 @@ pub(crate) trait Readable: Law {
         self.inner().is_some()
     }
 
-    /// Returns true if an update is slow even for short runs.
-    fn is_long(&self) -> bool {
-        false
+    /// Returns the number of values of input and error up to which an update takes so little time
+    /// that other Python threads may wait for it: it then reads the arrays in place.
+    fn in_place_max(&self) -> usize {
+        8192
     }
 
     /// Returns the law with a memory of runs by their relevance, if it is one.

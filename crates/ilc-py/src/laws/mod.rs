@@ -218,7 +218,9 @@ impl PyLaw {
     ///
     /// Notes
     /// -----
-    /// A law keeps copies of `u` and `e` for its next update if they have more than 2048 numbers.
+    /// An update that takes long releases the interpreter and works on copies of `u` and `e`, whose
+    /// memory the law keeps: above 8192 numbers in both, with bounds always, and in norm-optimal
+    /// learning without them above 262144.
     #[pyo3(signature = (u, e, disturbance=None, *, out=None))]
     fn update<'py>(
         &self,
@@ -229,7 +231,8 @@ impl PyLaw {
         out: Option<&Bound<'py, PyAny>>,
     ) -> Array<'py> {
         let mut state = self.state.borrow(py)?;
-        let signals = Signals::read(u, e, out, &mut state.copies)?;
+        let in_place_max = state.law.in_place_max();
+        let signals = Signals::read(u, e, out, &mut state.copies, in_place_max)?;
         let (u, e) = (signals.input.layout, signals.error.layout);
         let told = if state.law.n_disturbances().is_some() {
             disturbance.map(|given| read_disturbance("disturbance", given)).transpose()?
