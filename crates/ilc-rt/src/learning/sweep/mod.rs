@@ -23,6 +23,7 @@
 
 mod cholesky;
 mod factor;
+mod fading;
 mod fixed;
 mod fixed_step;
 mod general;
@@ -33,6 +34,7 @@ mod lanes;
 mod rate;
 mod record;
 mod recursion;
+mod side_by_side;
 mod single;
 mod square_root;
 mod stage;

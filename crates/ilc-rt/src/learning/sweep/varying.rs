@@ -1,26 +1,26 @@
 //! The two sweeps with gains that vary along the run, several segments in parallel (SIMD).
 //!
-//! For a constant plant whose weights alone vary, as those of a contour do. As in [`super::lanes`],
-//! each of [`LANES`] segments begins with a warm-up over its neighbour's samples, after which nothing
-//! is left of its own start. Of each sample only `K`, `H^-1` and the weights are kept, side by side
-//! for all segments: a quarter of what steps of several samples ([`super::general`]) would read. The
-//! segments depend on the gains and the length of the run alone, never on the processor.
+//! For a constant plant whose weights alone vary, as those of a contour do. The run is cut into
+//! [`LANES`] segments. The costate at a cut is a sum over the errors after it, and the state one over
+//! the `kappa` before it, whose factors fade: sums as long as double precision tells take the place of
+//! the sweeps over the neighbours. Of each sample only `K`, `H^-1` and the weights are kept, side by
+//! side for all segments: a quarter of what steps of several samples ([`super::general`]) would read.
+//! The segments depend on the gains and the length of the run alone, never on the processor.
 
 #![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 
-use nalgebra::SMatrix;
-
 use super::factor::Gains;
+use super::fading::{self, Sums};
 use super::interleaved::{Interleaved, TILE};
-use super::lane_step::FORGOTTEN;
+use super::side_by_side::Rows;
 use super::varying_step::{Entries, Model, backward, forward, is_apart};
 use super::wide::{Instructions, LANES, Wide, Work};
 use super::{Channels, Run, Stages, Sweep};
 
 /// Returns the solver for these gains.
 ///
-/// `None` unless they vary while the plant does not, for one of the sizes below, and are forgotten
-/// early enough: the caller then uses [`super::General`].
+/// `None` unless they vary while the plant does not, for one of the sizes below, and fade within a
+/// segment: the caller then uses [`super::General`], which is as quick.
 pub(super) fn varying(
     gains: &Gains,
     stages: &impl Stages,
@@ -45,47 +45,6 @@ pub(super) fn varying(
     Some(choose!(4 2 true 4 2 false 6 2 false 6 3 true))
 }
 
-/// Numbers of eight segments side by side, aligned to a row.
-#[derive(Debug)]
-struct Rows {
-    values: Vec<f64>,
-    first: usize,
-}
-
-impl Rows {
-    /// Makes room for some rows, and for one more before and after them.
-    fn new(count: usize) -> Self {
-        let values = vec![0.0_f64; (count + 3) * LANES];
-        let first = LANES + values.as_ptr().align_offset(size_of::<f64>() * LANES).min(LANES);
-        Self { values, first }
-    }
-
-    /// Returns the rows from one on.
-    #[inline(always)]
-    fn at(&self, row: usize) -> &[[f64; LANES]] {
-        self.values[self.first + row * LANES..].as_chunks().0
-    }
-
-    #[inline(always)]
-    fn at_mut(&mut self, row: usize) -> &mut [[f64; LANES]] {
-        self.values[self.first + row * LANES..].as_chunks_mut().0
-    }
-
-    /// Returns the rows from one on, each lane with the numbers of the next lane; those of the last
-    /// are of no use.
-    #[inline(always)]
-    fn next_lane(&self, row: usize) -> &[[f64; LANES]] {
-        self.values[self.first + row * LANES + 1..].as_chunks().0
-    }
-
-    /// Returns the rows from one on, each lane with the numbers of the lane before; those of the
-    /// first are of no use.
-    #[inline(always)]
-    fn previous_lane(&self, row: usize) -> &[[f64; LANES]] {
-        self.values[self.first + row * LANES - 1..].as_chunks().0
-    }
-}
-
 /// The solver for `N` states, `M` inputs and as many targets.
 #[derive(Debug)]
 struct Varying<const N: usize, const M: usize, const APART: bool> {
@@ -93,11 +52,14 @@ struct Varying<const N: usize, const M: usize, const APART: bool> {
     is_held: bool,
     channels: Channels,
     instructions: Instructions,
-    /// Both in tiles. The last segment may reach beyond the run, where all gains are zero.
-    warm_up: usize,
+    /// Tiles of a segment. The last one may reach beyond the run, where all gains are zero.
     stretch: usize,
     /// The [`Entries`] of each sample of a segment.
     gains: Rows,
+    /// Factors of error and input after each segment in the costate at its end.
+    after: Sums,
+    /// Factors of `kappa` before each segment in the state at its start.
+    before: Sums,
     /// `M` rows for each sample of a segment.
     kappa: Rows,
 }
@@ -112,14 +74,12 @@ impl<const N: usize, const M: usize, const APART: bool> Varying<N, M, APART> {
         let n_samples = gains.n_samples();
         let stretch = n_samples.div_ceil(LANES * TILE);
         let length = stretch * TILE;
-        let cuts = (1..LANES).map(|lane| lane * length).filter(|cut| *cut < n_samples);
-        let mut warm_up = 0;
-        for cut in cuts {
-            let after = cut..(cut + length).min(n_samples);
-            let before = (cut - length..cut).rev();
-            warm_up = warm_up
-                .max(forgotten::<N>(gains, after, false)?)
-                .max(forgotten::<N>(gains, before, true)?);
+        let (mut after, mut before) = (Vec::new(), Vec::new());
+        for (lane, cut) in (1..LANES).map(|lane| (lane, lane * length)) {
+            if cut < n_samples {
+                after.push((lane - 1, fading::after::<N>(gains, cut, length)?));
+                before.push((lane, fading::before::<N>(gains, cut, length)?));
+            }
         }
         let mut stage = stages.stage(0);
         let is_held = gains.sizes().held > 0;
@@ -129,9 +89,10 @@ impl<const N: usize, const M: usize, const APART: bool> Varying<N, M, APART> {
             is_held,
             channels: channels.clone(),
             instructions,
-            warm_up: warm_up.div_ceil(TILE),
             stretch,
             gains: Rows::new(length * count),
+            after: Sums::new(&after, if is_held { 2 * M * N } else { M * N }),
+            before: Sums::new(&before, M * N),
             kappa: Rows::new(length * M),
         };
         for k in 0..n_samples {
@@ -152,29 +113,25 @@ impl<const N: usize, const M: usize, const APART: bool> Varying<N, M, APART> {
 
     #[inline(always)]
     fn sweep(&mut self, wide: impl Wide, run: &mut Run) {
-        let Self { model, is_held, channels, warm_up, stretch, gains, kappa, .. } = self;
+        let Self { model, is_held, channels, stretch, gains, after, before, kappa, .. } = self;
         let (length, count) = (*stretch * TILE, Entries::<N, M>::count(*is_held));
         let errors = Interleaved::<M>::new(&channels.outputs, &channels.shifts, run.n_outputs);
         let inputs = Interleaved::<M>::new(&channels.inputs, &[], run.n_inputs);
-        let zero = wide.row(&[0.0; LANES]);
         let starts: [usize; LANES] = std::array::from_fn(|lane| lane * length);
-        // The last segment has no next one.
-        let next: [usize; LANES] = std::array::from_fn(|lane| (lane + 1).min(LANES - 1) * length);
+        let zero = wide.row(&[0.0; LANES]);
 
         let mut costate = [zero; N];
-        for tile in (0..*warm_up).rev() {
+        // The factors of the last segment, which has no next one, are zero.
+        let next: [usize; LANES] = std::array::from_fn(|lane| (lane + 1).min(LANES - 1) * length);
+        for tile in 0..after.n_samples().div_ceil(TILE) {
             let error = errors.load(wide, run.error, &next, tile);
             let input = if *is_held { inputs.load(wide, run.input, &next, tile) } else { error };
-            for s in (0..TILE).rev() {
-                let rows = gains.next_lane((tile * TILE + s) * count);
-                let Some(entries) = Entries::new(&rows[..count]) else { return };
-                backward(wide, model, entries, &mut costate, &error[s], &input[s]);
+            for s in 0..TILE {
+                let factors = after.factors(tile * TILE + s);
+                let [of_error, of_input] = [0, M * N].map(|first| factors.get(first..));
+                add(wide, &mut costate, of_error, &error[s]);
+                add(wide, &mut costate, of_input, &input[s]);
             }
-        }
-        for costate in &mut costate {
-            let mut exact = wide.values(*costate);
-            exact[LANES - 1] = 0.0;
-            *costate = wide.row(&exact);
         }
         for tile in (0..*stretch).rev() {
             let error = errors.load(wide, run.error, &starts, tile);
@@ -190,23 +147,16 @@ impl<const N: usize, const M: usize, const APART: bool> Varying<N, M, APART> {
         }
 
         let mut state = [zero; N];
-        for k in length - *warm_up * TILE..length {
-            let rows = gains.previous_lane(k * count);
-            let Some(entries) = Entries::new(&rows[..count]) else { return };
-            let kappa = rows_of(wide, kappa.previous_lane(k * M));
-            forward(wide, model, entries, &mut state, &kappa);
-        }
-        for state in &mut state {
-            let mut exact = wide.values(*state);
-            exact[0] = 0.0;
-            *state = wide.row(&exact);
+        for j in 0..before.n_samples() {
+            let kappa: [_; M] = read(wide, kappa.of_lane_before((length - 1 - j) * M));
+            add(wide, &mut state, Some(before.factors(j)), &kappa);
         }
         for tile in 0..*stretch {
             let mut changes = [[zero; M]; TILE];
             for (s, change) in changes.iter_mut().enumerate() {
                 let k = tile * TILE + s;
                 let Some(entries) = Entries::new(&gains.at(k * count)[..count]) else { return };
-                let kappa = rows_of(wide, kappa.at(k * M));
+                let kappa = read(wide, kappa.at(k * M));
                 *change = forward(wide, model, entries, &mut state, &kappa);
             }
             inputs.store(wide, run, &starts, tile, changes);
@@ -216,7 +166,7 @@ impl<const N: usize, const M: usize, const APART: bool> Varying<N, M, APART> {
 
 /// Loads some rows.
 #[inline(always)]
-fn rows_of<W: Wide, const M: usize>(wide: W, from: &[[f64; LANES]]) -> [W::Row; M] {
+fn read<W: Wide, const M: usize>(wide: W, from: &[[f64; LANES]]) -> [W::Row; M] {
     let mut rows = [wide.row(&[0.0; LANES]); M];
     for (row, values) in rows.iter_mut().zip(from) {
         *row = wide.row(values);
@@ -224,28 +174,21 @@ fn rows_of<W: Wide, const M: usize>(wide: W, from: &[[f64; LANES]]) -> [W::Row; 
     rows
 }
 
-/// Returns the number of samples after which a state is forgotten, passing those given: along
-/// their transitions in time (`is_late`: the last one is multiplied first), or against it.
-fn forgotten<const N: usize>(
-    gains: &Gains,
-    samples: impl Iterator<Item = usize>,
-    is_late: bool,
-) -> Option<usize> {
-    let rows = N + gains.n_inputs();
-    let mut power = SMatrix::<f64, N, N>::identity();
-    let mut largest = 0.0_f64;
-    for (count, k) in samples.enumerate() {
-        // Relative to the largest so far, as the states may have different units.
-        let size = power.amax();
-        largest = largest.max(size);
-        if size < FORGOTTEN * largest {
-            return Some(count);
+/// Adds multiples of `M` columns, if there are as many.
+#[inline(always)]
+fn add<W: Wide, const N: usize, const M: usize>(
+    wide: W,
+    sum: &mut [W::Row; N],
+    columns: Option<&[[f64; LANES]]>,
+    factors: &[W::Row; M],
+) {
+    let columns = columns.and_then(|rows| rows.as_chunks::<N>().0.first_chunk::<M>());
+    let Some(columns) = columns else { return };
+    for (column, factor) in columns.iter().zip(factors) {
+        for (sum, entry) in sum.iter_mut().zip(column) {
+            *sum = wide.add(*sum, wide.multiply(wide.row(entry), *factor));
         }
-        let fore = gains.at(k).fore;
-        let transition = SMatrix::<f64, N, N>::from_fn(|i, j| fore[j * rows + i]);
-        power = if is_late { power * transition } else { transition * power };
     }
-    None
 }
 
 /// The solver with the run to solve.
