@@ -17,7 +17,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Takes over the factors of each lane that has some, `width` a sample; the shorter sums go on
+    /// Takes over the factors of each lane that has some, `width` a sample; the shorter sums continue
     /// with zeros.
     pub(super) fn new(lanes: &[(usize, Vec<f64>)], width: usize) -> Self {
         let longest = lanes.iter().map(|(_, factors)| factors.len()).max().unwrap_or(0);
@@ -79,7 +79,7 @@ fn transition<const N: usize>(gains: &Gains, k: usize) -> SMatrix<f64, N, N> {
     SMatrix::from_fn(|i, j| fore[j * rows + i])
 }
 
-/// Collects factors until the product of transitions, which `step` goes on with, has faded.
+/// Collects factors until the product of transitions, which `step` continues, has faded.
 fn fading<const N: usize>(
     samples: impl Iterator<Item = usize>,
     reach: usize,

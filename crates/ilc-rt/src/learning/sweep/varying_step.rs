@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use super::Stage;
 use super::wide::{LANES, Wide};
 
-/// What all samples share: a model of `N` states, `M` inputs and as many targets.
+/// The part that all samples share: a model of `N` states, `M` inputs and as many targets.
 ///
 /// If it is `APART`, each input and target has `N / M` states of its own, and only the weights
 /// couple them.
