@@ -24,7 +24,8 @@ pub(super) fn without_mark(text: &[u8]) -> Result<&[u8], &'static str> {
 pub(super) fn shown(text: &[u8]) -> String {
     let text = String::from_utf8_lossy(&text[..text.len().min(8 * SHOWN_MAX)]);
     let mut shown = String::new();
-    let mut characters = text.trim().chars();
+    // Other white space, such as a no-break space, is what is refused: it must be seen.
+    let mut characters = text.trim_matches(|c: char| c.is_ascii_whitespace()).chars();
     for character in characters.by_ref().take(SHOWN_MAX) {
         match character {
             '\'' | '"' | '\\' => shown.push(character),
@@ -54,6 +55,7 @@ mod tests {
     #[test]
     fn what_is_shown_is_short_and_has_no_control_characters() {
         assert_eq!(shown(b" X\x1b[31m\r\n\xff "), "X\\u{1b}[31m\\r\\n\u{fffd}");
+        assert_eq!(shown("\u{a0}\u{2028}\u{3000}x".as_bytes()), r"\u{a0}\u{2028}\u{3000}x");
         assert_eq!(shown(&[b'9'; 5000]).chars().count(), SHOWN_MAX + 1);
     }
 }
