@@ -129,7 +129,10 @@ def running(*arguments: str, cell: Path = CELL) -> Iterator[tuple[Sim, canopen.N
 
 def disconnect(network: canopen.Network) -> None:
     """End what a network sends periodically, wait for its last frames, and close its bus."""
-    network.bus.stop_all_periodic_tasks()
+    # Once each: SocketCAN does not know a task any more that it has stopped.
+    for node in network.values():
+        node.pdo.stop()
+    network.sync.stop()
     # `stop` sets a flag only: its thread may be on the way to the bus, which must still be open.
     for thread in threading.enumerate():
         if thread.name.startswith("Cyclic send task"):
