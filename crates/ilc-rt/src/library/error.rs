@@ -137,6 +137,17 @@ pub enum LibraryError {
         /// Key of the row.
         id: i64,
     },
+    /// A stored value that the program cannot have written.
+    #[error(
+        "library {path}: {found}; restore the file from a copy, or delete this row of the table \
+         iteration"
+    )]
+    Unreadable {
+        /// File.
+        path: String,
+        /// Row and column.
+        found: Unreadable,
+    },
     /// Runs were deleted, but the file could not be made smaller.
     #[error(
         "library {path}: {n_deleted} runs were deleted, but the file could not be made smaller: \
@@ -152,9 +163,24 @@ pub enum LibraryError {
     },
 }
 
+/// A value that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("iteration {id} is damaged: its {column} cannot be read")]
+pub struct Unreadable {
+    /// Key of the row.
+    pub id: i64,
+    /// Column of the value.
+    pub column: String,
+}
+
 /// Converts an error of SQLite for a file.
 pub(super) fn told(path: &str, source: rusqlite::Error) -> LibraryError {
     let path = path.to_owned();
+    if let rusqlite::Error::FromSqlConversionFailure(_, _, cause) = &source
+        && let Some(found) = cause.downcast_ref::<Unreadable>()
+    {
+        return LibraryError::Unreadable { path, found: found.clone() };
+    }
     match source.sqlite_error_code() {
         Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => LibraryError::Locked { path },
         _ => LibraryError::Sqlite { path, source },

@@ -1,6 +1,7 @@
 //! Columns and values of a run's figures, derived from the struct.
 
-use rusqlite::types::{Value, ValueRef};
+use rusqlite::types::{Type, Value, ValueRef};
+use serde::Deserialize as _;
 use serde_json::{Map, Value as Json};
 
 use crate::record::{Field, FieldKind, Figures, figure_fields};
@@ -51,7 +52,19 @@ pub(super) fn read(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<Fi
         };
         described.insert(field.name.clone(), value);
     }
-    serde_json::from_value(Json::Object(described)).map_err(|error| {
-        rusqlite::Error::FromSqlConversionFailure(0, rusqlite::types::Type::Text, Box::new(error))
+    let described = Json::Object(described);
+    Figures::deserialize(&described).map_err(|error| {
+        let place = figure_fields().iter().position(|field| is_wrong(&described, &field.name));
+        let column = first + place.unwrap_or_default();
+        rusqlite::Error::FromSqlConversionFailure(column, Type::Text, Box::new(error))
+    })
+}
+
+/// Returns true if a value is the reason that figures cannot be read.
+fn is_wrong(described: &Json, name: &str) -> bool {
+    let mut figures = serde_json::to_value(Figures::default()).unwrap_or_default();
+    described.get(name).is_some_and(|value| {
+        figures[name] = value.clone();
+        Figures::deserialize(&figures).is_err()
     })
 }

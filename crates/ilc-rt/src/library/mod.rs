@@ -30,7 +30,7 @@ mod upgrade;
 
 pub use earlier::Earlier;
 pub use elsewhere::{Elsewhere, ElsewhereError};
-pub use error::LibraryError;
+pub use error::{LibraryError, Unreadable};
 pub(crate) use file::IN_MEMORY;
 pub use fitting::Fitting;
 pub use held::Held;

@@ -1,5 +1,8 @@
 //! One row of the table: reading, and the texts of its lists.
 
+use rusqlite::types::Type;
+
+use super::error::Unreadable;
 use super::figures;
 use super::schema::COLUMNS;
 use super::signals::{Computed, floats};
@@ -25,6 +28,29 @@ pub struct Row {
 /// Reads a row of `schema::query`, whose columns have the order of [`COLUMNS`], of the figures, and
 /// of the arrays.
 pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
+    read(row, with_arrays).map_err(|error| unreadable(row, error))
+}
+
+/// Names row and column of a value that could not be read.
+fn unreadable(row: &rusqlite::Row<'_>, error: rusqlite::Error) -> rusqlite::Error {
+    use rusqlite::Error::{FromSqlConversionFailure, IntegralValueOutOfRange, InvalidColumnType};
+    let (FromSqlConversionFailure(place, ..)
+    | IntegralValueOutOfRange(place, _)
+    | InvalidColumnType(place, ..)) = error
+    else {
+        return error;
+    };
+    let found = row.get(0).and_then(|id| {
+        let column = row.as_ref().column_name(place)?.to_owned();
+        Ok(Unreadable { id, column })
+    });
+    match found {
+        Ok(found) => FromSqlConversionFailure(place, Type::Text, Box::new(found)),
+        Err(_) => error,
+    }
+}
+
+fn read(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
     let mut columns = 0..;
     let mut next = || columns.next().unwrap_or_default();
     let list = |text: Option<String>| -> Vec<String> {

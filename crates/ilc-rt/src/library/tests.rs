@@ -55,6 +55,34 @@ fn what_was_appended_is_read_back_bit_by_bit() {
 }
 
 #[test]
+fn a_value_that_cannot_be_read_is_named_with_its_run() {
+    for (column, value) in [
+        ("tracking_rms_m", "9e999"),
+        ("tracking_rms_m", "'0.1 m'"),
+        ("axes_tracking_inf_m", "'[null]'"),
+        ("update_ms", "-9e999"),
+        ("overruns", "-1"),
+        ("iteration", "-5"),
+        ("cell", "x'00ff'"),
+        ("n_axes", "'two'"),
+    ] {
+        let library = Library::in_memory().unwrap();
+        for index in 0..3 {
+            library.append(&meta("a"), &record(index)).unwrap();
+        }
+        let damage = format!("UPDATE iteration SET {column} = {value} WHERE id = 2");
+        library.connection.execute(&damage, []).unwrap();
+        let wanted = Unreadable { id: 2, column: column.to_owned() };
+        let errors = [library.load(2).map(drop), library.list(None).map(drop)];
+        for error in errors.map(Result::unwrap_err) {
+            let LibraryError::Unreadable { found, .. } = error else { panic!("{error}") };
+            assert_eq!(found, wanted, "{value}");
+        }
+        assert!(library.load(1).is_ok() && library.load(3).is_ok());
+    }
+}
+
+#[test]
 fn a_run_cannot_be_kept_twice() {
     let library = Library::in_memory().unwrap();
     library.append(&meta("a"), &record(0)).unwrap();
