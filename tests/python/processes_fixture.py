@@ -38,6 +38,8 @@ to_m = [0.08, 0.04]
 to_m = [0.06, 0.06]
 
 """
+#: For what a browser shows within a second on an idle machine.
+BROWSER_WAIT_MS = 180_000
 #: For real-time tests that do not concern punctuality: a busy machine may delay a process.
 PATIENT = """
 [safety]

@@ -13,7 +13,7 @@ import pytest
 from fleet_fixture import make_cell, template
 from ports_fixture import free_port
 from postgres_fixture import server
-from processes_fixture import Process
+from processes_fixture import BROWSER_WAIT_MS, Process
 
 from ilc_rt import BadInputError, Library
 from ilc_rt.cli import main
@@ -170,7 +170,7 @@ def test_a_database_that_cannot_be_read_is_one_line_without_its_password(
         assert "secret" not in said[0]
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this computer")
 def test_a_browser_compares_runs_of_a_fleet(address: str, tmp_path: Path) -> None:
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -183,15 +183,15 @@ def test_a_browser_compares_runs_of_a_fleet(address: str, tmp_path: Path) -> Non
         with sync_api.sync_playwright() as tools:
             browser = tools.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
             page = browser.new_page()
-            page.set_default_timeout(60_000)
+            page.set_default_timeout(BROWSER_WAIT_MS)
             page.goto(f"{url}/library")
             page.fill('input[type="search"]', "cell-00")
-            sync_api.expect(page.locator("[data-run]")).to_have_count(6, timeout=60_000)
+            sync_api.expect(page.locator("[data-run]")).to_have_count(6, timeout=BROWSER_WAIT_MS)
             for box in page.locator("[data-run]").all()[:2]:
                 box.check()
             page.wait_for_function("ilc.option('compare-error')?.series.length === 2")
             told = page.get_by_text("notes belong to library files")
-            sync_api.expect(told).to_be_visible(timeout=60_000)
+            sync_api.expect(told).to_be_visible(timeout=BROWSER_WAIT_MS)
             browser.close()
     finally:
         process.close()

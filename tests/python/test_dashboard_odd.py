@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from processes_fixture import Process
+from processes_fixture import BROWSER_WAIT_MS, Process
 
 from ilc_rt import Library
 
@@ -27,10 +27,9 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this computer"),
     pytest.mark.xdist_group("odd dashboard"),
-    pytest.mark.timeout(300),
+    pytest.mark.timeout(600),
 ]
 
-WAIT_MS = 60_000
 LONG = "20261129-074100-7aad-of-the-press-in-hall"
 ODD = ("my cell", "機械 ünïcode", "<b>x</b>", "a" * 200)
 
@@ -41,7 +40,7 @@ class Served:
     def __init__(self, folder: Path, browser: Browser) -> None:
         self.browser = browser
         # For all that is expected below; five seconds are few for a loaded machine.
-        sync_api.expect.set_options(timeout=WAIT_MS)
+        sync_api.expect.set_options(timeout=BROWSER_WAIT_MS)
         self.library = Library(folder / "odd.db")
         for number in range(4):
             error = np.full((40, 1), 1e-4 / (1 + number))
@@ -60,7 +59,7 @@ class Served:
     def page(self, path: str, width: int = 1400) -> Page:
         """Open a page in a browser profile of its own."""
         context = self.browser.new_context(viewport={"width": width, "height": 900})
-        context.set_default_timeout(WAIT_MS)
+        context.set_default_timeout(BROWSER_WAIT_MS)
         page = context.new_page()
         page.goto(self.url + path)
         return page

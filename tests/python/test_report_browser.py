@@ -57,7 +57,7 @@ def browse(
             [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
              "--hide-scrollbars", f"--user-data-dir={profile}", *options,
              file.as_uri()],
-            capture_output=True, text=True, timeout=100, check=True,
+            capture_output=True, text=True, timeout=250, check=True,
         )  # fmt: skip
         answer = re.search(r'data-found="([^"]*)"', done.stdout)
         assert answer is not None, done.stderr[-2000:]
@@ -196,6 +196,6 @@ def test_a_picture_can_be_taken(finished: CampaignResult, tmp_path: Path) -> Non
         [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--window-size=1280,2400",
          f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={picture}",
          (tmp_path / "report.html").as_uri()],
-        capture_output=True, timeout=100, check=True,
+        capture_output=True, timeout=250, check=True,
     )  # fmt: skip
     assert picture.stat().st_size > 100_000
