@@ -4,10 +4,8 @@
 #![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 
 use super::Run;
+use super::tile::TILE;
 use super::wide::{LANES, Wide};
-
-/// Samples fetched at a time: those of one channel fill a row.
-pub(super) const TILE: usize = LANES;
 
 /// `M` channels of a time-first signal.
 #[derive(Debug, Clone, Copy)]

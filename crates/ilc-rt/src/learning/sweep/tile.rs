@@ -1,4 +1,5 @@
-//! Signals tile by tile: some samples of eight segments at a time. For [`super::lanes`] only.
+//! Signals tile by tile: some samples of eight segments at a time. For [`super::lanes`]; the length
+//! of a tile for [`super::varying`], too.
 
 #![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 

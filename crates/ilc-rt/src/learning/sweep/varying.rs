@@ -11,8 +11,9 @@
 
 use super::factor::Gains;
 use super::fading::{self, Sums};
-use super::interleaved::{Interleaved, TILE};
+use super::interleaved::Interleaved;
 use super::side_by_side::Rows;
+use super::tile::TILE;
 use super::varying_step::{Entries, Model, backward, forward, is_apart};
 use super::wide::{Instructions, LANES, Wide, Work};
 use super::{Channels, Run, Stages, Sweep};

@@ -89,7 +89,7 @@ pub(super) struct Entries<'a, const N: usize, const M: usize> {
     feedback: &'a [[[f64; LANES]; N]; M],
     /// `H^-1`.
     inverse: &'a [[[f64; LANES]; M]; M],
-    /// `Q` of the targets.
+    /// `Q` of the targets, which no problem couples to its penalties.
     weight: &'a [[[f64; LANES]; M]; M],
     /// `-S`, if there is any.
     held: Option<&'a [[[f64; LANES]; M]; M]>,

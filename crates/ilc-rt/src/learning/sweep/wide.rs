@@ -1,6 +1,6 @@
 //! SIMD rows of eight numbers, with the widest instructions of the processor.
 //!
-//! For the constant-gain sweep ([`super::lanes`], [`super::single`]) and for many plants side by side
+//! For the sweeps of this folder, and for many plants side by side
 //! ([`crate::learning::batch`]). Products and sums are rounded
 //! separately, never fused, so results are bit-identical on every processor.
 
