@@ -148,6 +148,7 @@ fn python_and_the_simulator_stay_outside_the_controller() {
             let is_forbidden = match name {
                 "pyo3" | "numpy" => true,
                 "ilc-sim" => folder == "crates/ilc-rt",
+                "ilc-numerics" => folder != "crates/ilc-rt",
                 _ => false,
             };
             // The crate's own name is `name = "…"`, so a line that begins with a name is a

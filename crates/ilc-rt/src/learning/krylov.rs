@@ -3,7 +3,7 @@
 //! Lanczos for symmetric maps, Arnoldi for others, GMRES for fixed points; no `N x N` matrix of the
 //! run's length is stored. [`analysis`](super::analysis) and the norm of the lifted system use it.
 
-use faer::Mat;
+use ilc_numerics::Matrix;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::span::{combine, product, products};
@@ -233,14 +233,15 @@ pub(in crate::learning) fn fixed_point(
 
 /// Returns the spectral radius of a small matrix.
 pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64> {
-    let (rows, cols) = matrix.shape();
-    let values = Mat::from_fn(rows, cols, |i, j| matrix[(i, j)]).eigenvalues().map_err(|_| {
-        LearningError::Numerics {
-            what: "spectral radius",
-            reason: "the eigenvalue iteration did not end",
-        }
-    })?;
-    Ok(values.iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max))
+    radius_of(&Matrix::square(matrix.nrows(), matrix.as_slice()))
+}
+
+/// Returns the spectral radius of a dense matrix.
+pub(in crate::learning) fn radius_of(matrix: &Matrix) -> Result<f64> {
+    matrix.spectral_radius().ok_or(LearningError::Numerics {
+        what: "spectral radius",
+        reason: "the eigenvalue iteration did not end",
+    })
 }
 
 /// Order of the terms of a sum over a vector.

@@ -2,8 +2,7 @@
 
 use std::f64::consts::PI;
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use ilc_numerics::fourier::{self, Complex};
 
 use super::SignalError;
 use super::channel::check_sample_time;
@@ -28,8 +27,7 @@ pub fn analytic(x: &[f64]) -> Vec<Complex<f64>> {
     if n == 0 {
         return signal;
     }
-    let mut planner = FftPlanner::new();
-    planner.plan_fft_forward(n).process(&mut signal);
+    fourier::forward(n).process(&mut signal);
     for (k, value) in signal.iter_mut().enumerate() {
         // The zero and, for an even length, the Nyquist frequency are their own mirror images.
         *value *= match (2 * k).cmp(&n) {
@@ -39,7 +37,7 @@ pub fn analytic(x: &[f64]) -> Vec<Complex<f64>> {
             std::cmp::Ordering::Greater => 0.0,
         } / n as f64;
     }
-    planner.plan_fft_inverse(n).process(&mut signal);
+    fourier::inverse(n).process(&mut signal);
     signal
 }
 

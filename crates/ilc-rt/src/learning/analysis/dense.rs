@@ -1,21 +1,20 @@
 //! The figures of the analysis from dense matrices, for short runs.
 
-use faer::linalg::solvers::Solve;
-use faer::{ColRef, Mat};
+use ilc_numerics::Matrix;
 
 use super::iteration::Iteration;
-use crate::learning::krylov::{Estimate, largest_symmetric, radius};
+use crate::learning::krylov::{Estimate, largest_symmetric, radius, radius_of};
 use crate::learning::{LearningError, Result};
 
 /// The matrices of one iteration, without the inputs that do not affect convergence.
 #[derive(Debug)]
 pub(super) struct Dense {
     /// `T`
-    pub(super) t: Mat<f64>,
+    pub(super) t: Matrix,
     /// `L_e`
-    pub(super) learn: Mat<f64>,
+    pub(super) learn: Matrix,
     /// `P`
-    pub(super) plant: Mat<f64>,
+    pub(super) plant: Matrix,
     /// Indices of the inputs that were kept.
     pub(super) kept: Vec<usize>,
     n_inputs: usize,
@@ -28,7 +27,7 @@ impl Dense {
         let kept: Vec<usize> = (0..n_u).filter(|i| !iteration.free().contains(i)).collect();
         let n = kept.len();
         let (mut t, mut learn, mut plant) =
-            (Mat::zeros(n, n), Mat::zeros(n, n_e), Mat::zeros(n_e, n));
+            (Matrix::zeros(n, n), Matrix::zeros(n, n_e), Matrix::zeros(n_e, n));
         let mut unit = vec![0.0; n_u];
         let mut out = vec![0.0; n_u];
         let mut error = vec![0.0; n_e];
@@ -63,7 +62,7 @@ impl Dense {
     /// diagonal blocks, whereas a general eigenvalue solver would return the spectrum of the
     /// rounding errors (`T` is far from normal). The radius of a symmetric `T` is its norm, the factor.
     pub(super) fn spectral_radius(&self, factor: Estimate) -> Result<Estimate> {
-        let n = self.t.nrows();
+        let n = self.t.n_rows();
         if n == 0 {
             return Ok(Estimate::exact(0.0));
         }
@@ -91,13 +90,7 @@ impl Dense {
             }
             return Ok(Estimate::exact(value));
         }
-        let failed = LearningError::Numerics {
-            what: "spectral radius",
-            reason: "the eigenvalue iteration did not end",
-        };
-        let values = self.t.eigenvalues().map_err(|_| failed)?;
-        let value = values.iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max);
-        Ok(Estimate::exact(value))
+        radius_of(&self.t).map(Estimate::exact)
     }
 
     /// Returns the largest singular value of `T`.
@@ -107,12 +100,12 @@ impl Dense {
 
     /// Returns the largest singular value of `L_e P`, the factor of the model uncertainty.
     pub(super) fn learned_share(&self) -> Result<f64> {
-        largest_singular_value(&(&self.learn * &self.plant))
+        largest_singular_value(&self.learn.times(&self.plant))
     }
 
     /// Returns true if `T = T'` up to rounding.
     fn is_symmetric(&self) -> bool {
-        let (n, largest) = (self.t.nrows(), self.t.norm_max());
+        let (n, largest) = (self.t.n_rows(), self.t.norm_max());
         (0..n).all(|col| {
             (0..col).all(|row| (self.t[(row, col)] - self.t[(col, row)]).abs() <= 1e-13 * largest)
         })
@@ -125,11 +118,11 @@ impl Dense {
         if factor.value <= 1.0 {
             return Ok(1.0);
         }
-        let mut power = &self.t * &self.t;
+        let mut power = self.t.times(&self.t);
         let mut largest = factor.value;
         for _ in 0..DOUBLINGS {
             crate::interrupt::point();
-            let size = power.norm_max() * power.nrows() as f64;
+            let size = power.norm_max() * power.n_rows() as f64;
             if !(size.is_finite() && size < 1e100) {
                 return Ok(f64::INFINITY);
             }
@@ -139,20 +132,22 @@ impl Dense {
             if bound_of_norm(&power) > largest {
                 largest = largest.max(norm_of(&power)?);
             }
-            power = &power * &power;
+            power = power.times(&power);
         }
         Ok(largest)
     }
 
     /// Solves `(I - T) u = right`; the omitted inputs stay zero.
     pub(super) fn fixed_point(&self, right: &[f64]) -> Vec<f64> {
-        let n = self.t.nrows();
-        let system = Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j)) - self.t[(i, j)]);
-        let target = Mat::from_fn(n, 1, |i, _| right[self.kept[i]]);
-        let solution = system.partial_piv_lu().solve(&target);
+        let n = self.t.n_rows();
+        let mut system = Matrix::zeros(n, n);
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            system[(i, j)] = f64::from(u8::from(i == j)) - self.t[(i, j)];
+        }
+        let target: Vec<f64> = self.kept.iter().map(|at| right[*at]).collect();
         let mut input = vec![0.0; right.len()];
-        for (i, at) in self.kept.iter().enumerate() {
-            input[*at] = solution[(i, 0)];
+        for (value, at) in system.solve(&target).into_iter().zip(&self.kept) {
+            input[*at] = value;
         }
         input
     }
@@ -163,24 +158,24 @@ impl Dense {
     /// every run.
     pub(super) fn noise(&self, n_runs: usize, converges: bool) -> (Vec<f64>, Option<f64>) {
         const DOUBLINGS: usize = 48;
-        let gram = self.plant.transpose() * &self.plant;
-        let share = |sigma: &Mat<f64>| -> f64 {
+        let gram = self.plant.transposed_times(&self.plant);
+        let share = |sigma: &Matrix| -> f64 {
             let mut sum = 0.0;
-            for j in 0..sigma.ncols() {
-                for i in 0..sigma.nrows() {
+            for j in 0..sigma.n_columns() {
+                for i in 0..sigma.n_rows() {
                     sum += sigma[(i, j)] * gram[(i, j)];
                 }
             }
             sum
         };
-        let fresh = &self.learn * self.learn.transpose();
-        let n = self.t.nrows();
-        let mut sigma = Mat::<f64>::zeros(n, n);
+        let fresh = self.learn.times_transposed(&self.learn);
+        let n = self.t.n_rows();
+        let mut sigma = Matrix::zeros(n, n);
         let mut shares = Vec::with_capacity(n_runs);
         for run in 0..n_runs {
             shares.push(share(&sigma));
             if run + 1 < n_runs {
-                sigma = &self.t * &sigma * self.t.transpose() + &fresh;
+                sigma = self.t.times(&sigma).times_transposed(&self.t).plus(&fresh);
             }
         }
         if !converges {
@@ -191,7 +186,7 @@ impl Dense {
         let mut before = share(&sigma);
         for _ in 0..DOUBLINGS {
             crate::interrupt::point();
-            sigma = &sigma + &power * &sigma * power.transpose();
+            sigma = sigma.plus(&power.times(&sigma).times_transposed(&power));
             let now = share(&sigma);
             if !now.is_finite() {
                 return (shares, None);
@@ -200,16 +195,16 @@ impl Dense {
                 return (shares, Some(now));
             }
             before = now;
-            power = &power * &power;
+            power = power.times(&power);
         }
         (shares, None)
     }
 }
 
 /// Returns a bound of the largest singular value, of little work: the Frobenius norm or `sqrt(|M|_1 |M|_inf)`.
-fn bound_of_norm(matrix: &Mat<f64>) -> f64 {
-    let (mut columns, mut rows) = (0.0_f64, vec![0.0; matrix.nrows()]);
-    for j in 0..matrix.ncols() {
+fn bound_of_norm(matrix: &Matrix) -> f64 {
+    let (mut columns, mut rows) = (0.0_f64, vec![0.0; matrix.n_rows()]);
+    for j in 0..matrix.n_columns() {
         let mut sum = 0.0;
         for (i, row) in rows.iter_mut().enumerate() {
             let size = matrix[(i, j)].abs();
@@ -222,14 +217,12 @@ fn bound_of_norm(matrix: &Mat<f64>) -> f64 {
 }
 
 /// Returns the largest singular value, from products with single vectors if a few hundred of them tell it.
-fn norm_of(matrix: &Mat<f64>) -> Result<f64> {
-    let n = matrix.ncols();
+fn norm_of(matrix: &Matrix) -> Result<f64> {
+    let n = matrix.n_columns();
     let square = largest_symmetric(
         n,
         &mut |x, out| {
-            let image = matrix * ColRef::from_slice(x);
-            let back = matrix.transpose() * image;
-            out.iter_mut().zip(back.iter()).for_each(|(out, value)| *out = *value);
+            matrix.gram_times(x, out);
             Ok(())
         },
         60,
@@ -243,14 +236,9 @@ fn norm_of(matrix: &Mat<f64>) -> Result<f64> {
     }
 }
 
-fn largest_singular_value(matrix: &Mat<f64>) -> Result<f64> {
-    if matrix.nrows() == 0 || matrix.ncols() == 0 {
-        return Ok(0.0);
-    }
-    let failed = LearningError::Numerics {
+fn largest_singular_value(matrix: &Matrix) -> Result<f64> {
+    matrix.largest_singular_value().ok_or(LearningError::Numerics {
         what: "monotonic factor",
         reason: "the singular value iteration did not end",
-    };
-    let values = matrix.singular_values().map_err(|_| failed)?;
-    Ok(values.iter().copied().fold(0.0, f64::max))
+    })
 }

@@ -4,8 +4,8 @@
 //! law: its spectrum is the law's frequency response. So a law written in Python is analysed like a
 //! built-in one.
 
+use ilc_numerics::fourier;
 use nalgebra::{Complex, DMatrix};
-use rustfft::FftPlanner;
 
 use super::iteration::{FLOOR, Iteration};
 use crate::learning::Result;
@@ -68,7 +68,7 @@ impl Spectrum {
             }
         }
         let n_fft = (2 * n_samples).max(2048).next_power_of_two();
-        let fft = FftPlanner::new().plan_fft_forward(n_fft);
+        let fft = fourier::forward(n_fft);
         let centre = n_samples / 2;
         let transform = |response: &Vec<f64>| -> Vec<Complex<f64>> {
             let mut bins = vec![Complex::new(0.0, 0.0); n_fft];

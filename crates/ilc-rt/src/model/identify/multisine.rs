@@ -1,7 +1,6 @@
 //! Multisine: many sines at once, with phases that keep the peak low.
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use ilc_numerics::fourier::{self, Complex};
 
 use super::excitation::{check, refused};
 use crate::model::ModelError;
@@ -47,7 +46,7 @@ pub fn multisine(
         spectrum[line] = Complex::from_polar(0.5, phase);
         spectrum[n_samples - line] = spectrum[line].conj();
     }
-    FftPlanner::new().plan_fft_inverse(n_samples).process(&mut spectrum);
+    fourier::inverse(n_samples).process(&mut spectrum);
     let mut values: Vec<f64> = spectrum.iter().map(|u| u.re).collect();
     let smallest = (0..n_samples).min_by(|&a, &b| values[a].abs().total_cmp(&values[b].abs()));
     values.rotate_left(smallest.unwrap_or(0));

@@ -2,8 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use ilc_numerics::fourier::{self, Complex};
 
 use crate::model::ModelError;
 
@@ -90,7 +89,7 @@ impl Spectra {
             cross: vec![Complex::new(0.0, 0.0); bins],
             n_averages: 0.0,
         };
-        let fft = FftPlanner::new().plan_fft_forward(n);
+        let fft = fourier::forward(n);
         let transform = |signal: &[f64]| {
             let mean = match averaging {
                 Averaging::Periods { .. } => 0.0,

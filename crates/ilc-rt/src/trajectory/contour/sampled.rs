@@ -1,6 +1,8 @@
 //! The nearest point of a whole sampled path, by a spatial index (k-d tree).
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use std::num::NonZero;
+
+use ilc_numerics::{Neighbours, neighbours};
 
 use super::ContourError;
 
@@ -28,7 +30,7 @@ pub struct SampledPath<const N: usize> {
     samples_m: Vec<[f64; N]>,
     /// The step that each piece belongs to.
     steps: Vec<usize>,
-    index: Option<ImmutableKdTree<f64, N>>,
+    index: Option<Box<dyn Neighbours>>,
     piece_max_m: f64,
 }
 
@@ -53,7 +55,7 @@ impl<const N: usize> SampledPath<N> {
             samples_m.windows(2).map(|pair| distance_m(&pair[0], &pair[1])).collect();
         let n_moving = lengths_m.iter().filter(|length| **length > 0.0).count();
         let piece_max_m = lengths_m.iter().sum::<f64>() / n_moving.max(1) as f64;
-        let (mut middles, mut steps) = (Vec::new(), Vec::new());
+        let (mut middles, mut steps) = (Vec::<[f64; N]>::new(), Vec::new());
         for (step, length_m) in lengths_m.iter().enumerate() {
             if *length_m > 0.0 {
                 let pieces = (length_m / piece_max_m).ceil().max(1.0);
@@ -69,8 +71,7 @@ impl<const N: usize> SampledPath<N> {
         let index = if middles.is_empty() {
             None
         } else {
-            let refused = |_| ContourError::Empty;
-            Some(ImmutableKdTree::new_from_slice(&middles).map_err(refused)?)
+            Some(neighbours(middles.as_flattened(), N).ok_or(ContourError::Empty)?)
         };
         Ok(Self { samples_m: samples_m.to_vec(), steps, index, piece_max_m })
     }
@@ -99,18 +100,12 @@ impl<const N: usize> SampledPath<N> {
         let first = self.samples_m.first()?;
         let rest = Nearest { distance_m: distance_m(point_m, first), foot_m: *first, sample: 0.0 };
         let Some(index) = &self.index else { return Some(rest) };
-        let query = index.query(point_m);
-        let middle = query.nearest_one::<SquaredEuclidean<f64>>().execute().distance.sqrt();
+        let middle = index.squared_distance(point_m, NonZero::<usize>::MIN).sqrt();
         // Slightly more than half a piece, so that rounding of a square root hides nothing.
         let reach_m = (middle + 0.5 * self.piece_max_m) * (1.0 + 1e-12);
-        let near = index
-            .query(point_m)
-            .within::<SquaredEuclidean<f64>>(reach_m * reach_m)
-            .unsorted()
-            .execute();
         let mut best: Option<Nearest<N>> = None;
-        for item in near {
-            let step = self.steps[item.item as usize];
+        index.within(point_m, reach_m * reach_m, &mut |piece| {
+            let step = self.steps[piece];
             let found = self.on_step(point_m, step);
             let is_better = best.is_none_or(|best| {
                 found.distance_m < best.distance_m
@@ -119,7 +114,7 @@ impl<const N: usize> SampledPath<N> {
             if is_better {
                 best = Some(found);
             }
-        }
+        });
         Some(best.unwrap_or(rest))
     }
 

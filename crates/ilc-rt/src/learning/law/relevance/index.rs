@@ -2,7 +2,7 @@
 
 use std::num::NonZero;
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use ilc_numerics::{Neighbours, neighbours};
 
 use super::weights::RelevanceWeights;
 
@@ -60,7 +60,7 @@ pub(super) fn index(n_samples: usize, n_disturbances: usize) -> Option<Box<dyn I
 struct Grown<const K: usize> {
     n_samples: usize,
     places: Vec<[f64; K]>,
-    tree: Option<ImmutableKdTree<f64, K>>,
+    tree: Option<Box<dyn Neighbours>>,
     n_in_tree: usize,
 }
 
@@ -73,7 +73,7 @@ impl<const K: usize> Grown<K> {
         let n = self.places.len();
         let behind = n - self.n_in_tree;
         if behind > FEW && behind * behind > 16 * n {
-            self.tree = ImmutableKdTree::new_from_slice(&self.places).ok();
+            self.tree = neighbours(self.places.as_flattened(), K);
             self.n_in_tree = if self.tree.is_some() { n } else { 0 };
         }
     }
@@ -129,16 +129,8 @@ impl<const K: usize> Index for Grown<K> {
             // Any n runs bound the distance of the n-th nearest one. Everything within that bound
             // is compared again here, so that neither the tree's rounding nor its order of ties
             // decides.
-            let bound = tree
-                .query(&here)
-                .nearest_n::<SquaredEuclidean<f64>>(n)
-                .execute()
-                .iter()
-                .fold(0.0, |bound, near| f64::max(bound, near.distance));
-            tree.query(&here)
-                .within::<SquaredEuclidean<f64>>(bound * (1.0 + ROUNDING) + f64::MIN_POSITIVE)
-                .unsorted()
-                .visit(|near| found.push(of(near.item as usize)));
+            let bound = tree.squared_distance(&here, n) * (1.0 + ROUNDING) + f64::MIN_POSITIVE;
+            tree.within(&here, bound, &mut |number| found.push(of(number)));
         }
         found.extend((self.n_in_tree..self.places.len()).map(of));
         let order =
