@@ -95,8 +95,8 @@ impl Deref for Signal {
 impl Signal {
     /// Reads `(n_samples,)` or `(n_samples, n_channels)`.
     pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (values, shape) = read_array(name, object)?;
-        Layout::of(name, &shape).map(|layout| Self { values, layout })
+        let (values, array) = finite(name, object)?;
+        Layout::of(name, array.shape()).map(|layout| Self { values, layout })
     }
 
     /// Refuses any other number of channels.
@@ -122,8 +122,8 @@ pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Mat
 
 /// Reads a list of numbers with exactly one axis.
 pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let (values, shape) = read_array(name, object)?;
-    if shape.len() == 1 { Ok(values) } else { Err(misfit(name, &shape, "one axis, (n,)")) }
+    let (values, array) = finite(name, object)?;
+    if array.ndim() == 1 { Ok(values) } else { Err(misfit(name, array.shape(), "one axis, (n,)")) }
 }
 
 /// Reads two numbers.
@@ -158,9 +158,18 @@ pub(crate) fn read_array(
     name: &str,
     object: &Bound<'_, PyAny>,
 ) -> PyResult<(Vec<f64>, Vec<usize>)> {
-    let (values, shape) = read_numbers(name, object)?;
-    refuse_infinite(name, &values, &shape)?;
-    Ok((values, shape))
+    finite(name, object).map(|(values, array)| (values, array.shape().to_vec()))
+}
+
+/// Reads finite numbers, and returns their array as well.
+fn finite<'py>(
+    name: &str,
+    object: &Bound<'py, PyAny>,
+) -> PyResult<(Vec<f64>, Bound<'py, PyArrayDyn<f64>>)> {
+    let array = in_order(name, object)?;
+    let values = array.to_vec()?;
+    refuse_infinite(name, &values, array.shape())?;
+    Ok((values, array))
 }
 
 /// Refuses infinite or NaN numbers in a row-major array.

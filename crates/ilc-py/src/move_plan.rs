@@ -1,6 +1,6 @@
 //! Plans of moves without samples: the native side of `ilc_rt.trajectory.MovePlan`.
 
-use ilc_rt::trajectory::{AxisLimits, Linear, LinearSetting, PathSegment};
+use ilc_rt::trajectory::{AxisLimits, Linear, LinearSetting};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -45,11 +45,8 @@ impl PyMovePlan {
         let limits = limits_of([velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3], n_axes)?;
         let setting = choice("setting", setting, &SETTINGS)?;
         let start_velocity_m_s = read_each("start_velocity_m_s", start_velocity_m_s, n_axes)?;
-        let planned = || {
-            let (start_m, ends_m) = points_m.split_at(n_axes);
-            let segments = PathSegment::lines(ends_m, n_axes, &feed_m_s);
-            Linear::plan_moving(start_m, &start_velocity_m_s, &segments, &limits, setting)
-        };
+        let planned =
+            || Linear::through(&points_m, &feed_m_s, &start_velocity_m_s, &limits, setting);
         let is_short = layout.n_samples <= FEW;
         let plan = if is_short { planned() } else { detached(py, planned) }.or_raise()?;
         Ok(Self { plan, points_m, feed_m_s, limits, setting, start_velocity_m_s })

@@ -11,8 +11,7 @@ use ilc_rt::trajectory::kind::RasterSection;
 use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
 use ilc_rt::trajectory::{
     AxisLimits, ExponentialSigmoid, Linear, LinearSetting, MAX_AXES, ModulatedSegment, MoveError,
-    POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex, TrajectoryError,
-    points_program,
+    POINTS_A_PERIOD, PathSpec, SampledMotion, TrackingIndex, TrajectoryError, points_program,
 };
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -136,14 +135,7 @@ fn read_place(a: Arguments<'_, '_>, name: &str) -> PyResult<[f64; 2]> {
     Err(PyValueError::new_err(format!("{name} = ({x}, {y}); finite numbers are needed")))
 }
 
-fn sample_linear(
-    start_m: &[f64],
-    segments: &[PathSegment],
-    limits: &[AxisLimits],
-    setting: LinearSetting,
-    dt_s: f64,
-) -> Planned {
-    let plan = Linear::plan(start_m, segments, limits, setting)?;
+fn sampled(plan: &Linear, limits: &[AxisLimits], dt_s: f64) -> Planned {
     Ok((plan.sampled(dt_s)?.verified(limits)?, Vec::new()))
 }
 
@@ -179,12 +171,12 @@ fn along<'py, C: Curve>(
 
 #[pyfunction]
 pub(crate) fn jerk_limited<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
-    let ((start, ends), dt_s) = (read_points(a)?, a.number("dt_s")?);
-    let n_axes = start.len();
-    let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, ends.len() / n_axes)?;
-    let (limits, setting) = (read_limits(a, n_axes)?, a.choice("setting", &SETTINGS)?);
-    let segments = PathSegment::lines(&ends, n_axes, &feeds);
-    planned(a.py(), || sample_linear(&start, &segments, &limits, setting, dt_s))
+    let (points, dt_s) = (a.signal("points_m")?, a.number("dt_s")?);
+    let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, points.n_samples - 1)?;
+    let (limits, setting) = (read_limits(a, points.n_channels)?, a.choice("setting", &SETTINGS)?);
+    planned(a.py(), || {
+        sampled(&Linear::through(&points.values, &feeds, &[], &limits, setting)?, &limits, dt_s)
+    })
 }
 
 #[pyfunction]
@@ -231,7 +223,7 @@ pub(crate) fn modulated<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
         None => sample_exponential(&start, &[segment], &limits, &AlphaMax::default(), dt_s),
         Some(setting) => {
             let program = points_program(&start, &segment, POINTS_A_PERIOD)?;
-            sample_linear(&start, &program, &limits, setting, dt_s)
+            sampled(&Linear::plan(&start, &program, &limits, setting)?, &limits, dt_s)
         }
     })
 }
@@ -287,7 +279,7 @@ pub(crate) fn raster<'py>(a: Arguments<'_, 'py>) -> ByName<'py> {
     let (feed_m_s, setting) = (a.number("feed_m_s")?, a.choice("setting", &SETTINGS)?);
     planned(a.py(), || {
         let program = raster.segments(start, feed_m_s)?;
-        sample_linear(&start, &program, &limits, setting, dt_s)
+        sampled(&Linear::plan(&start, &program, &limits, setting)?, &limits, dt_s)
     })
 }
 

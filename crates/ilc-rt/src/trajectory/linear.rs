@@ -10,7 +10,8 @@ use crate::interpolate::line::Line;
 use crate::interpolate::{AxisLimits, MoveError, PathLimits};
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::motion::{MotionState, SampledMotion};
-use crate::trajectory::path::{PathSegment, checked_lines};
+use crate::trajectory::path::{PathSegment, check_limits, checked_line, point};
+
 mod approach;
 mod axis_state;
 mod to_rest;
@@ -70,72 +71,105 @@ impl Linear {
     /// [`TrajectoryError`] for values out of range.
     /// # Source
     /// - \[dimarco2016\], Chapter 2: both settings and their costs
-    pub fn plan(
+    pub fn plan<'a>(
         start_m: &[f64],
-        segments: &[PathSegment],
+        segments: &'a [PathSegment],
         limits: &[AxisLimits],
         setting: LinearSetting,
     ) -> Result<Self, TrajectoryError> {
-        Self::plan_moving(start_m, &[], segments, limits, setting)
+        check_limits(start_m.len(), limits)?;
+        let start = starting(start_m, &[], limits)?;
+        let straight = |(segment, planned): (usize, &'a PathSegment)| match planned.arc {
+            None => Ok((&planned.to_m[..], planned.feed_m_s)),
+            Some(_) => Err(TrajectoryError::NotStraight { segment }),
+        };
+        Self::planned(&start, segments.iter().enumerate().map(straight), limits, setting)
     }
 
-    /// Plans a program that begins in motion, as [`Linear::plan`] does.
+    /// Plans straight moves through points, beginning in motion; otherwise as [`Linear::plan`] does.
     ///
     /// The first move takes each axis from its velocity, without acceleration, to the target; an
     /// axis faster than the feed slows down to it.
     ///
     /// # Shapes
-    /// - `start_velocity_m_s`: one entry for each coordinate of `start_m`, or none for a start at
-    ///   rest
+    /// - `points_m`: rows of one coordinate for each entry of `limits`; the first is the start
+    /// - `feeds_m_s`: one for each further row
+    /// - `start_velocity_m_s`: one for each entry of `limits`, or none for a start at rest
     /// # Real Time
     /// Cold: allocates.
     /// # Errors
-    /// Those of [`Linear::plan`]; [`TrajectoryError::StartVelocity`] for one beyond its limit.
-    pub fn plan_moving(
-        start_m: &[f64],
+    /// Those of [`Linear::plan`]; [`TrajectoryError::Shape`] for other numbers of them, and
+    /// [`TrajectoryError::StartVelocity`] for one beyond its limit.
+    pub fn through(
+        points_m: &[f64],
+        feeds_m_s: &[f64],
         start_velocity_m_s: &[f64],
-        segments: &[PathSegment],
         limits: &[AxisLimits],
         setting: LinearSetting,
     ) -> Result<Self, TrajectoryError> {
-        let lines = checked_lines(start_m, segments, limits)?;
-        let n_axes = start_m.len();
+        let n_axes = limits.len();
+        check_limits(n_axes, limits)?;
+        if points_m.len() != (feeds_m_s.len() + 1) * n_axes {
+            return Err(TrajectoryError::Shape {
+                name: "number of coordinates",
+                value: points_m.len() as f64,
+                allowed: "one for each axis, of the start and of the end of each move",
+            });
+        }
+        let (start_m, ends_m) = points_m.split_at(n_axes);
         let start = starting(start_m, start_velocity_m_s, limits)?;
+        let moves = ends_m.chunks_exact(n_axes).zip(feeds_m_s);
+        Self::planned(&start, moves.map(|(to_m, feed_m_s)| Ok((to_m, *feed_m_s))), limits, setting)
+    }
+
+    /// Plans moves, each given by its end and its feed, from a state.
+    fn planned<'a>(
+        start: &[AxisState; MAX_AXES],
+        moves: impl ExactSizeIterator<Item = Result<(&'a [f64], f64), TrajectoryError>>,
+        limits: &[AxisLimits],
+        setting: LinearSetting,
+    ) -> Result<Self, TrajectoryError> {
+        if moves.len() == 0 {
+            return Err(TrajectoryError::Empty);
+        }
         let mut plan = Self {
-            moves: Vec::with_capacity(lines.len()),
+            moves: Vec::with_capacity(moves.len()),
             axes: Vec::new(),
-            n_axes,
+            n_axes: limits.len(),
             duration_s: 0.0,
             nominal_s: 0.0,
         };
-        let mut start_s = 0.0;
-        for (index, (line, segment)) in lines.into_iter().zip(segments).enumerate() {
+        let (mut start_s, mut from_m) = (0.0, start.map(|axis| axis.p));
+        for (index, planned) in moves.enumerate() {
+            let (to_m, feed_m_s) = planned?;
+            let line = checked_line(index, from_m, to_m, feed_m_s, plan.n_axes)?;
+            from_m = line.to_m;
             let now = if index == 0 {
-                start
+                Some(*start)
             } else if setting == LinearSetting::CompleteEveryMove {
-                resting(&line)
+                None
             } else {
-                plan.state(start_s)
+                Some(plan.state(start_s))
             };
             let duration_s;
-            let course = if now == resting(&line) {
-                let along = PathLimits::along(&line.direction, limits, segment.feed_m_s);
+            let course = if let Some(now) = now.filter(|now| !rests(now, &line.from_m)) {
+                let first = plan.axes.len();
+                duration_s = plan.add_together(&now, &line, limits, feed_m_s);
+                Course::Axes(first)
+            } else {
+                let along = PathLimits::along(&line.direction, limits, feed_m_s);
                 let profile = JerkLimited::along(line.length_m, &along)?;
                 duration_s = profile.duration_s();
                 Course::Straight(profile)
-            } else {
-                let first = plan.axes.len();
-                duration_s = plan.add_together(&now, &line, limits, segment.feed_m_s);
-                Course::Axes(first)
             };
             plan.duration_s = start_s + duration_s;
-            if !plan.duration_s.is_finite() {
-                let (length, duration_s) = (line.length_m, plan.duration_s);
-                return Err(MoveError::Duration { length, duration_s }.into());
-            }
             let length_m = line.length_m;
+            if !plan.duration_s.is_finite() {
+                let duration_s = plan.duration_s;
+                return Err(MoveError::Duration { length: length_m, duration_s }.into());
+            }
             plan.moves.push(Move { line, course, start_s, programmed_s: plan.nominal_s });
-            plan.nominal_s += length_m / segment.feed_m_s;
+            plan.nominal_s += length_m / feed_m_s;
             start_s = match setting {
                 LinearSetting::CompleteEveryMove => plan.duration_s,
                 LinearSetting::StartOnTime => plan.nominal_s,
@@ -273,9 +307,9 @@ impl Linear {
     }
 }
 
-/// Returns the state at rest at the start of a line.
-fn resting(line: &Line) -> [AxisState; MAX_AXES] {
-    line.from_m.map(|p| AxisState { p, ..AxisState::default() })
+/// Returns true for axes at rest at a point.
+fn rests(state: &[AxisState; MAX_AXES], at_m: &[f64; MAX_AXES]) -> bool {
+    state.iter().zip(at_m).all(|(state, p)| *state == AxisState { p: *p, ..AxisState::default() })
 }
 
 /// Checks the start of a program, and returns its state.
@@ -292,14 +326,14 @@ fn starting(
             allowed: "one for each coordinate of the start, or none",
         });
     }
-    let mut start = [AxisState::default(); MAX_AXES];
-    for (axis, (state, p)) in start.iter_mut().zip(start_m).enumerate() {
+    let mut start = point(start_m)?.map(|p| AxisState { p, ..AxisState::default() });
+    for (axis, state) in start.iter_mut().enumerate().take(expected) {
         let v = start_velocity_m_s.get(axis).copied().unwrap_or(0.0);
         let limit = limits[axis].velocity_max_m_s;
         if !(-limit..=limit).contains(&v) {
             return Err(TrajectoryError::StartVelocity { axis, velocity: v, limit });
         }
-        *state = AxisState { p: *p, v, ..AxisState::default() };
+        state.v = v;
     }
     Ok(start)
 }

@@ -139,10 +139,11 @@ fn no_axis_jumps_when_it_arrives() {
 #[test]
 fn a_program_may_begin_in_motion() {
     let limits = [LIMITS[0]; 2];
+    let (points_m, feeds_m_s) = ([0.0, 0.05, 0.2, 0.0, 0.2, 0.1], [0.3, 0.3]);
     let moves = [PathSegment::line(vec![0.2, 0.0], 0.3), PathSegment::line(vec![0.2, 0.1], 0.3)];
     for setting in [LinearSetting::CompleteEveryMove, LinearSetting::StartOnTime] {
         let plan = |velocity_m_s: &[f64]| {
-            Linear::plan_moving(&[0.0, 0.05], velocity_m_s, &moves, &limits, setting)
+            Linear::through(&points_m, &feeds_m_s, velocity_m_s, &limits, setting)
         };
         let moving = plan(&[0.25, -0.1]).unwrap();
         let start = moving.at(0.0);
@@ -168,11 +169,19 @@ fn a_program_may_begin_in_motion() {
             before = now;
         }
         let resting = plan(&[]).unwrap();
+        let same = Linear::plan(&points_m[..2], &moves, &limits, setting).unwrap();
         let faster = plan(&[0.25, 0.0]).unwrap();
         assert!(faster.moves[1].start_s <= resting.moves[1].start_s, "{setting:?}");
         for t_s in [0.0, 0.3, 0.7, 1.5] {
             assert_eq!(plan(&[0.0, 0.0]).unwrap().at(t_s), resting.at(t_s));
+            assert_eq!(same.at(t_s), resting.at(t_s));
         }
+        for (points, feeds) in [(&points_m[..5], 2), (&points_m, 1), (&points_m[..0], 0)] {
+            let refused = Linear::through(points, &feeds_m_s[..feeds], &[], &limits, setting);
+            assert!(matches!(refused, Err(TrajectoryError::Shape { .. })), "{points:?} {feeds}");
+        }
+        let none = Linear::through(&points_m[..2], &[], &[], &limits, setting);
+        assert!(matches!(none, Err(TrajectoryError::Empty)));
         for bad in [&[0.1][..], &[0.1, 0.0, 0.0]] {
             assert!(matches!(plan(bad), Err(TrajectoryError::Shape { .. })), "{bad:?}");
         }
@@ -204,9 +213,9 @@ fn bad_programs_are_refused() {
 
 #[test]
 fn tables_and_samples_are_those_of_the_motion() {
-    let program = PathSegment::lines(&[0.02, 0.05], 1, &[0.1, 0.2]);
-    assert_eq!(program[1], PathSegment::line(vec![0.05], 0.2));
-    let plan = Linear::plan(&[0.0], &program, &LIMITS, LinearSetting::StartOnTime).unwrap();
+    let (points_m, feeds_m_s) = ([0.0, 0.02, 0.05], [0.1, 0.2]);
+    let plan = Linear::through(&points_m, &feeds_m_s, &[], &LIMITS, LinearSetting::StartOnTime);
+    let plan = plan.unwrap();
     let motion = plan.sampled(0.002).unwrap();
     let times_s: Vec<f64> = (0..motion.n_samples()).map(|k| k as f64 * 0.002).collect();
     let [position_m, velocity_m_s, acceleration_m_s2] = plan.tables_at(&times_s);

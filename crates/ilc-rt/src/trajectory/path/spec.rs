@@ -30,15 +30,6 @@ impl PathSegment {
     pub fn line(to_m: Vec<f64>, feed_m_s: f64) -> Self {
         Self { to_m, feed_m_s, arc: None, dwell_s: 0.0 }
     }
-
-    /// Returns straight moves through points, each with its feed.
-    ///
-    /// # Shapes
-    /// - `ends_m`: rows of `n_axes` coordinates; `feeds_m_s`: one per row
-    pub fn lines(ends_m: &[f64], n_axes: usize, feeds_m_s: &[f64]) -> Vec<Self> {
-        let moves = ends_m.chunks_exact(n_axes.max(1)).zip(feeds_m_s);
-        moves.map(|(to_m, feed_m_s)| Self::line(to_m.to_vec(), *feed_m_s)).collect()
-    }
 }
 
 /// An arc in the plane of two axes; the other axes move in proportion (helix).
@@ -138,18 +129,9 @@ fn checked_legs(
     let mut from_m = point(start_m)?;
     let mut legs = Vec::with_capacity(segments.len());
     for (index, segment) in segments.iter().enumerate() {
-        if segment.to_m.len() != start_m.len() {
-            return Err(TrajectoryError::Coordinates {
-                segment: index,
-                found: segment.to_m.len(),
-                expected: start_m.len(),
-            });
-        }
-        if !is_positive(segment.feed_m_s) {
-            return Err(TrajectoryError::Feed { segment: index, feed: segment.feed_m_s });
-        }
-        let to_m = point(&segment.to_m)?;
-        let element = match segment.arc {
+        let PathSegment { to_m, feed_m_s, arc, dwell_s } = segment;
+        let to_m = end_of(index, to_m, *feed_m_s, start_m.len())?;
+        let element = match *arc {
             None => Element::Line(Line::new(from_m, to_m)),
             Some(ArcSpec { plane, center_m, clockwise }) => {
                 let [p, q] = plane;
@@ -169,9 +151,40 @@ fn checked_legs(
             return Err(TrajectoryError::ZeroLength { segment: index });
         }
         from_m = to_m;
-        legs.push(Leg { element, feed_m_s: segment.feed_m_s, dwell_s: segment.dwell_s });
+        legs.push(Leg { element, feed_m_s: *feed_m_s, dwell_s: *dwell_s });
     }
     Ok(legs)
+}
+
+/// Checks the end of a segment and its feed, and returns its point.
+fn end_of(
+    segment: usize,
+    to_m: &[f64],
+    feed_m_s: f64,
+    n_axes: usize,
+) -> Result<[f64; MAX_AXES], TrajectoryError> {
+    if to_m.len() != n_axes {
+        return Err(TrajectoryError::Coordinates { segment, found: to_m.len(), expected: n_axes });
+    }
+    if !is_positive(feed_m_s) {
+        return Err(TrajectoryError::Feed { segment, feed: feed_m_s });
+    }
+    point(to_m)
+}
+
+/// Checks the end of a straight move from a point and its feed, and returns its line.
+pub(in crate::trajectory) fn checked_line(
+    segment: usize,
+    from_m: [f64; MAX_AXES],
+    to_m: &[f64],
+    feed_m_s: f64,
+    n_axes: usize,
+) -> Result<Line, TrajectoryError> {
+    let line = Line::new(from_m, end_of(segment, to_m, feed_m_s, n_axes)?);
+    if line.length_m == 0.0 {
+        return Err(TrajectoryError::ZeroLength { segment });
+    }
+    Ok(line)
 }
 
 /// Returns the feed of the fastest leg.
