@@ -13,8 +13,8 @@ pub trait Neighbours: Send + Sync + fmt::Debug {
     fn within(&self, at: &[f64], squared_distance: f64, visit: &mut dyn FnMut(usize));
 }
 
-/// Creates a tree over points of `n_coordinates` each, one after the other; `None` for none, for more
-/// than eight coordinates, or for numbers that are not finite.
+/// Creates a tree over points of `n_coordinates` each, one after the other; `None` for none or more
+/// than eight of them, or points that cannot be divided.
 pub fn neighbours(points: &[f64], n_coordinates: usize) -> Option<Box<dyn Neighbours>> {
     match n_coordinates {
         1 => tree::<1>(points),
@@ -81,6 +81,6 @@ mod tests {
             found.sort_unstable();
             assert_eq!(found, [39, 40, 41]);
         }
-        assert!(neighbours(&[0.0; 9], 9).is_none() && neighbours(&[], 2).is_none());
+        assert!(neighbours(&[0.0; 9], 9).is_none() && neighbours(&[0.0; 9], 0).is_none());
     }
 }

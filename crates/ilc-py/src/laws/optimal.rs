@@ -29,10 +29,10 @@ pub(super) const METHODS: [&str; 3] = ["contour", "formation", "dynamic"];
 readable! {
     NormOptimal as law => conditioning: Number(law.conditioning());
 
-    // About 0.2 ms for one axis of second order and 3 ms for 16 states; Python switches threads every
-    // 5 ms.
+    // About 0.2 ms for one axis of second order and 3 ms for 16 states or more; Python switches threads
+    // every 5 ms.
     fn in_place_max(&self) -> usize {
-        1 << 18
+        (1 << 26) / self.n_states().max(16).pow(2)
     }
 }
 readable! { DynamicNormOptimal as law => conditioning: Number(law.inner().conditioning()); }

@@ -21,10 +21,14 @@ pub(super) struct Approach {
     sense: f64,
     velocity: f64,
     acceleration: f64,
-    /// Velocity that remains if the acceleration is ramped down at once.
+    /// Change of velocity while the acceleration is ramped down, without sign.
+    easing: f64,
+    /// Velocity that remains after it.
     eased: f64,
     distance: f64,
     acceleration_max: f64,
+    /// Change of velocity of a ramp that just reaches it.
+    unheld: f64,
     jerk: f64,
     /// Distance beyond a direct stop.
     beyond_stop: f64,
@@ -88,14 +92,16 @@ impl Ramp {
 impl Approach {
     /// Takes the sense of the motion from a direct stop.
     pub(super) fn new(start: AxisState, target_m: f64, limits: &AxisLimits) -> Self {
-        let jerk = limits.jerk_max_m_s3;
+        let (most, jerk) = (limits.acceleration_max_m_s2, limits.jerk_max_m_s3);
         let mut way = Self {
             sense: 1.0,
             velocity: start.v,
             acceleration: start.a,
+            easing: start.a * start.a / (2.0 * jerk),
             eased: start.v + start.a * start.a.abs() / (2.0 * jerk),
             distance: target_m - start.p,
-            acceleration_max: limits.acceleration_max_m_s2,
+            acceleration_max: most,
+            unheld: most * most / jerk,
             jerk,
             beyond_stop: 0.0,
         };
@@ -229,7 +235,7 @@ impl Approach {
     /// where the limit cuts it, is rising and convex: Newton's method falls towards the root.
     fn rising(&self, below: f64, above: f64) -> f64 {
         let (most, jerk) = (self.acceleration_max, self.jerk);
-        let from = self.velocity - self.acceleration * self.acceleration / (2.0 * jerk);
+        let from = self.velocity - self.easing;
         let peak = |cruise: f64| {
             let squared = jerk * (cruise - from).max(0.0);
             if squared <= most * most { squared.sqrt() } else { 0.5 * (most + squared / most) }
@@ -262,7 +268,7 @@ impl Approach {
         let jerk = self.jerk;
         let sign = if cruise < self.eased { -1.0 } else { 1.0 };
         let (v, a, c) = (sign * self.velocity, sign * self.acceleration, sign * cruise);
-        let first = self.ramp(sign, (c - v + a * a / (2.0 * jerk)).max(0.0), a);
+        let first = self.ramp(sign, (c - v + self.easing).max(0.0), a);
         let last = self.ramp(-1.0, cruise, 0.0);
         let Ramp { peak, rise_s, hold_s, ease_s, .. } = first;
         let there = rise_s * (v + rise_s * (0.5 * a + rise_s * jerk / 6.0))
@@ -284,11 +290,12 @@ impl Approach {
         let (most, jerk) = (self.acceleration_max, self.jerk);
         let peak = (jerk * reserve).sqrt();
         let (peak, hold_s) =
-            if peak <= most { (peak, 0.0) } else { (most, (reserve - most * most / jerk) / most) };
+            if peak <= most { (peak, 0.0) } else { (most, (reserve - self.unheld) / most) };
         // Rounding must not leave an acceleration at the end of the ramp.
         let peak = peak.max(acceleration);
-        let rise_s = (peak - acceleration) / jerk;
-        Ramp { sign, peak, rise_s, hold_s, ease_s: peak / jerk }
+        let ease_s = peak / jerk;
+        let rise_s = if acceleration == 0.0 { ease_s } else { (peak - acceleration) / jerk };
+        Ramp { sign, peak, rise_s, hold_s, ease_s }
     }
 }
 

@@ -52,6 +52,7 @@ pub struct NormOptimal {
     invariant: Option<StateSpace>,
     scalars: Option<Weights>,
     conditioning: f64,
+    n_states: usize,
     parts: Vec<Box<dyn Sweep>>,
     /// Samples at the start of the run whose error is not used, at least in some output.
     n_unread: usize,
@@ -130,6 +131,7 @@ impl NormOptimal {
             invariant: plant.invariant().cloned(),
             scalars: cost.scalars(),
             conditioning: 1.0,
+            n_states: 0,
             parts: Vec::new(),
             n_unread: 0,
             inverses: Inverses::None,
@@ -175,6 +177,7 @@ impl NormOptimal {
             FactorError::Unbounded => LearningError::Unbounded { weights: weights() },
         })?;
         self.conditioning = self.conditioning.min(gains.conditioning());
+        self.n_states = self.n_states.max(gains.n_states());
         let shift = channels.shifts.iter().copied().max().unwrap_or(0);
         self.n_unread = self.n_unread.max(shift.min(self.n_samples));
         self.parts.push(sweep::solver(&gains, stages, channels));
@@ -185,6 +188,12 @@ impl NormOptimal {
     /// Below about `1e-12` part of the input is determined by noise only.
     pub fn conditioning(&self) -> f64 {
         self.conditioning
+    }
+
+    /// Returns the largest number of states among the groups of axes: the time of an update grows
+    /// with its square.
+    pub fn n_states(&self) -> usize {
+        self.n_states
     }
 
     /// Returns the number of groups of axes that are solved separately.
