@@ -135,6 +135,7 @@ fn axes_side_by_side_learn_as_if_alone() {
     let (u, e) = (noise(2 * n_samples, 3), noise(2 * n_samples, 4));
     let law = NormOptimal::new(&both, n_samples, w).unwrap();
     assert_eq!(law.n_parts(), 2);
+    assert_eq!(law.n_states(), NormOptimal::new(&y, n_samples, w).unwrap().n_states());
     let found = update(&both, n_samples, w, &u, &e);
     assert!(difference(&found, &dense(&both, n_samples, w, &u, &e)) < 1e-11);
 }
