@@ -9,4 +9,4 @@ mod matrix;
 mod neighbours;
 
 pub use matrix::Matrix;
-pub use neighbours::{Neighbours, neighbours};
+pub use neighbours::{COORDINATES_MAX, Neighbours, neighbours};

@@ -5,7 +5,7 @@ use std::ops::{Index, IndexMut};
 use faer::linalg::solvers::Solve;
 use faer::{ColRef, Mat};
 
-/// A matrix of real numbers.
+/// A matrix of real numbers; operations on matrices whose shapes do not fit panic.
 #[derive(Clone, Debug)]
 pub struct Matrix(Mat<f64>);
 
@@ -89,7 +89,8 @@ impl Matrix {
         Some(values.iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max))
     }
 
-    /// Returns the solution of `A x = right`, by a factorisation with partial pivoting.
+    /// Returns the solution of `A x = right`, by a factorisation with partial pivoting; it is not finite
+    /// for a singular matrix.
     pub fn solve(&self, right: &[f64]) -> Vec<f64> {
         let right = Mat::from_fn(right.len(), 1, |row, _| right[row]);
         self.0.partial_piv_lu().solve(&right).col(0).iter().copied().collect()

@@ -5,6 +5,9 @@ use std::num::NonZero;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
+/// Largest number of coordinates of a point.
+pub const COORDINATES_MAX: usize = 8;
+
 /// A tree over points; their numbers are those of their order.
 pub trait Neighbours: Send + Sync + fmt::Debug {
     /// Returns the squared distance of the `n`-th nearest point, up to rounding.
@@ -14,7 +17,7 @@ pub trait Neighbours: Send + Sync + fmt::Debug {
 }
 
 /// Creates a tree over points of `n_coordinates` each, one after the other; `None` for none or more
-/// than eight of them, or points that cannot be divided.
+/// than [`COORDINATES_MAX`] of them, or points that cannot be divided.
 pub fn neighbours(points: &[f64], n_coordinates: usize) -> Option<Box<dyn Neighbours>> {
     match n_coordinates {
         1 => tree::<1>(points),
@@ -24,7 +27,7 @@ pub fn neighbours(points: &[f64], n_coordinates: usize) -> Option<Box<dyn Neighb
         5 => tree::<5>(points),
         6 => tree::<6>(points),
         7 => tree::<7>(points),
-        8 => tree::<8>(points),
+        COORDINATES_MAX => tree::<COORDINATES_MAX>(points),
         _ => None,
     }
 }

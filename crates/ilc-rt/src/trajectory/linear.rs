@@ -100,6 +100,8 @@ impl Linear {
     /// # Errors
     /// Those of [`Linear::plan`]; [`TrajectoryError::Shape`] for other numbers of them, and
     /// [`TrajectoryError::StartVelocity`] for one beyond its limit.
+    /// # Source
+    /// - \[dimarco2016\], Chapter 2: both settings
     pub fn through(
         points_m: &[f64],
         feeds_m_s: &[f64],

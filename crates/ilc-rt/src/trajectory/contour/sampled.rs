@@ -2,7 +2,7 @@
 
 use std::num::NonZero;
 
-use ilc_numerics::{Neighbours, neighbours};
+use ilc_numerics::{COORDINATES_MAX, Neighbours, neighbours};
 
 use super::ContourError;
 
@@ -41,6 +41,7 @@ impl<const N: usize> SampledPath<N> {
     /// - [`ContourError::NotFinite`] for a sample that is infinite or NaN.
     /// - [`ContourError::Empty`] without samples.
     pub fn new(samples_m: &[[f64; N]]) -> Result<Self, ContourError> {
+        const { assert!(1 <= N && N <= COORDINATES_MAX, "coordinates of a point") };
         if samples_m.is_empty() {
             return Err(ContourError::Empty);
         }
